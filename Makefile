@@ -14,6 +14,7 @@ LEROBOT := .venv-lerobot/installed
 ROBOMIMIC := .venv-lerobot/with-robomimic
 RLDS := .venv-rlds/installed
 RERUN := .venv-rerun/installed
+MCPOLD := .venv-mcp-old/installed
 NODE := .node-mcap/installed
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
@@ -33,7 +34,7 @@ $(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % s
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-rerun test-viewers check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-rerun test-viewers test-mcp-old check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -134,6 +135,14 @@ $(NODE):
 	  @mcap/core@2.2.2 @mcap/nodejs@1.0.2 @mcap/support@1.1.0
 	@touch $@
 
+test-mcp-old: $(MCPOLD)  ## run the checks of the agents' server with version 1 of the protocol's SDK
+	.venv-mcp-old/bin/python -m pytest -n 0 tests/plugins/agents/test_mcp_1.py $(ARGS)
+
+$(MCPOLD): $(TEST)
+	$(call beside,.venv-mcp-old)
+	.venv-mcp-old/bin/python -m pip install --quiet "mcp>=1.30,<2"
+	@touch $@
+
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site
 check: $(CHECKS)  ## lint, format, types, layers, style and generated files (make -k check: do not stop at the first)
 .PHONY: $(CHECKS)
@@ -155,6 +164,7 @@ check-tables:
 	$(BIN)/python scripts/term_table.py --check
 	$(BIN)/python scripts/command_table.py --check
 	$(BIN)/python scripts/limits_table.py --check
+	$(BIN)/python scripts/importing_table.py --check
 	$(BIN)/python scripts/matter_table.py --check
 	$(BIN)/python scripts/robot_table.py --check
 	$(BIN)/python scripts/benchmark_table.py --check
@@ -185,6 +195,7 @@ docs: schema $(TEST)  ## write what is generated and run the examples of docs/
 	$(BIN)/python scripts/term_table.py
 	$(BIN)/python scripts/command_table.py
 	$(BIN)/python scripts/limits_table.py
+	$(BIN)/python scripts/importing_table.py
 	$(BIN)/python scripts/matter_table.py
 	$(BIN)/python scripts/robot_table.py
 	$(BIN)/python -m pytest tests/docs $(ARGS)

@@ -74,7 +74,9 @@ DYNAMIC = {
 """The engines of the repository that move things, and for want of what a test of theirs may be skipped."""
 
 
-@pytest.mark.parametrize("name", DYNAMIC)
+@pytest.mark.parametrize(
+    "name", [name if name == "mujoco" else pytest.param(name, marks=pytest.mark.slow) for name in DYNAMIC]
+)
 def test_an_engine_with_dynamics_passes(name, tmp_path):
     require_engine(name)
     passed, _, why = _summary(_run(tmp_path, "--engine", name))

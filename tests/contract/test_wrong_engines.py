@@ -13,7 +13,7 @@ import pytest
 
 from anysim.engine.capability import Capability
 
-pytestmark = pytest.mark.xdist_group("wrong engines")  # one worker runs them, once, for all tests
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wrong engines")]  # one worker runs them, once, for all tests
 
 HERE = Path(__file__).parent
 KINEMATIC = ("wrong_engines", "wrong_states")
@@ -29,6 +29,7 @@ CLAIMED = {
     Capability.SHAPE_MESH: ("ClaimsMeshes", "CentredMesh"),
     Capability.MIMIC_JOINTS: ("ClaimsMimics", "MimicsStayBehind"),
     Capability.JOINT_FRICTION: ("ClaimsJointFriction",),
+    Capability.JOINT_SPRINGS: ("ClaimsJointSprings", "SpringsToZero"),
     Capability.ARMATURE: ("StoredArmature", "NoArmature"),
     Capability.JOINT_LIMITS: ("ClaimsJointLimits",),
     Capability.EFFORT_LIMITS: ("NoEffortLimit", "StoredLimits"),

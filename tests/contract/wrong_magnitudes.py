@@ -1,4 +1,6 @@
-"""Engines whose states no world can be in: flights, energy from nowhere, what is not finite and not said."""
+"""Engines whose states no world can be in: flights, energy from nowhere, what is not finite; dead springs."""
+
+from dataclasses import replace
 
 import numpy as np
 from wrong_physics import Right
@@ -106,3 +108,21 @@ class BouncesHigher(Right):
                 twist = after[:, free].copy()
                 twist[..., 2] = np.where(turned, -1.3 * before[:, free, 2], twist[..., 2])
                 self._write_bodies(self._all, free, None, twist)
+
+
+class ClaimsJointSprings(Right):
+    """Springs pull at nothing."""
+
+    caught_by = ("test_physics.py::test_a_spring_swings_about_its_rest",)
+
+    def _spoil(self, world):
+        return replace(world, joints=tuple(replace(joint, stiffness=0.0) for joint in world.joints))
+
+
+class SpringsToZero(Right):
+    """Springs pull to zero, not to their rest."""
+
+    caught_by = ("test_physics.py::test_a_spring_pulls_beside_the_drive",)
+
+    def _spoil(self, world):
+        return replace(world, joints=tuple(replace(joint, spring_rest=0.0) for joint in world.joints))

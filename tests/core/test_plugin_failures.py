@@ -73,6 +73,7 @@ def test_ctrl_c_is_not_a_plugin_failing(install: Install) -> None:
         registry.load("skills", "rotten")
 
 
+@pytest.mark.slow
 def test_every_list_goes_on_past_plugins_that_end(install: Install) -> None:
     """One distribution with a plugin of every kind, an observer among them; all of them call sys.exit."""
     groups = {f"anysim.{kind}": f"{MODULE}.ends:Thing" for kind in registry.KINDS}

@@ -29,7 +29,9 @@ def heap(count: int) -> World:
     )
 
 
-@pytest.mark.parametrize("engine", runnable())
+@pytest.mark.parametrize(
+    "engine", [pytest.param(name, marks=pytest.mark.slow) if name == "mujoco" else name for name in runnable()]
+)
 def test_two_hundred_bodies_are_built_fall_and_lie(engine: str) -> None:
     world = heap(200)
     with create_simulation(engine) as simulation:

@@ -70,7 +70,10 @@ print(drop(12) - before)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-@pytest.mark.parametrize("engine", runnable())
+@pytest.mark.parametrize(
+    "engine",
+    [pytest.param(name, marks=pytest.mark.slow) if name in ("pybullet", "sapien") else name for name in runnable()],
+)
 def test_envs_that_are_dropped_take_no_memory(engine: str) -> None:
     """PyBullet took 42 MiB with each, an env of a larger world more."""
     command = [sys.executable, "-c", MEMORY, engine]

@@ -32,7 +32,11 @@ def anysim(*arguments: str) -> dict[str, Any]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("engine", "another", "rate"),
-    [("mujoco", "pybullet", 0.95), ("pybullet", "sapien", 0.90), ("sapien", "mujoco", 0.90)],
+    [
+        ("mujoco", "pybullet", 0.95),
+        pytest.param("pybullet", "sapien", 0.90, marks=pytest.mark.full),
+        pytest.param("sapien", "mujoco", 0.90, marks=pytest.mark.full),
+    ],
 )
 def test_picks_succeed_replay_to_the_bit_and_drift_little(
     engine: str, another: str, rate: float, tmp_path: Path

@@ -265,7 +265,11 @@ list(collected(Path(sys.argv[1]), "mujoco"))
 """
 
 
-@pytest.mark.parametrize("image", [1, 13, 24], ids=lambda number: f"image {number}")
+@pytest.mark.parametrize(
+    "image",
+    [pytest.param(1, marks=pytest.mark.slow), 13, pytest.param(24, marks=pytest.mark.slow)],
+    ids=lambda number: f"image {number}",
+)
 def test_kill_while_a_film_is_drawn(image: int, tmp_path: Path) -> None:
     """Of eight images in each episode: what is there is whole, and the next run sweeps the rest and completes it."""
     root = Path(__file__).parents[2]

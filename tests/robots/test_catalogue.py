@@ -16,6 +16,7 @@ from anysim.model.world import World
 from anysim_robots.qualify.result import Check
 from anysim_robots.qualify.run import FULL, Durations, qualify
 from anysim_robots.qualify.stage import NAME, controllers, stage
+from tests.tiers import by_turns
 
 ROBOTS = [n for n in registry.names("robots") if registry.distribution("robots", n) == "anysim-robots"]
 ENGINES = ("mujoco", "pybullet", "sapien")
@@ -130,9 +131,7 @@ def qualified(name: str, engine: str) -> dict[str, Check]:
     return {check.name: check for check in qualify(name, engine, durations).checks}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@robots
+@pytest.mark.parametrize(("name", "engine"), by_turns(ROBOTS))
 def test_it_qualifies_on_the_engine(name: str, engine: str) -> None:
     """Every check passes but those of `MISSES`, and none of those has become worse."""
     for check in qualified(name, engine).values():

@@ -45,7 +45,7 @@ def up(env: TaskEnv, name: str) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", REAL)
+@pytest.mark.parametrize("engine", [pytest.param(e, marks=pytest.mark.full) if e == "pybullet" else e for e in REAL])
 def test_no_robot_falls(engine: str) -> None:
     with team(engine, ENVS) as env:
         assert list(env.action_spaces) == [

@@ -9,7 +9,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim_avatars.hold import FREE, HELD
-from tests.tasks import bench_paths as bench, camera_paths as camera, person_paths as person
+from tests.tasks import bench_paths as bench, camera_paths as camera, matter_paths as matter, person_paths as person
 from tests.tasks.states import failed, level, offset, put, rewarded, seen, set_joint, set_opening
 
 
@@ -206,23 +206,7 @@ def _rising(robot: str, height: float, angle: float) -> Callable[[TaskEnv, float
     return path
 
 
-_BEADS = [f"bead_{number}" for number in range(4)]
-_TO_TRAY = _towards("cup", lambda env: seen(env, "tray"))
-
-
-def _pour(env: TaskEnv, share: float) -> None:
-    """The cup to where the tray is; there the beads lie in the tray, side by side."""
-    _TO_TRAY(env, share)
-    for number, bead in enumerate(_BEADS):
-        if share == 1.0:
-            put(env, bead, offset(seen(env, "tray"), x=0.03 * number - 0.045, z=0.04))
-
-
-def _spilled(env: TaskEnv) -> None:
-    for bead in _BEADS[:2]:
-        put(env, bead, offset(seen(env, bead), x=0.3))
-
-
+_POURED = matter.poured(_towards("cup", lambda env: seen(env, "tray")))
 _BESIDE = _towards("beside", lambda env: level(seen(env, "spot"), seen(env, "beside")))
 _ON_BOTH = _towards("top", lambda env: level(offset(seen(env, "spot"), z=0.04), seen(env, "top")))
 
@@ -467,7 +451,8 @@ CASES: dict[str, Case] = {
         ],
     ),
     "flip_switch": Case(_opening("switch.rocker", 0.0, 0.95), [lambda env: set_opening(env, "switch.rocker", 0.85)]),
-    "pour_beads": Case(_pour, [_spilled]),
+    "pour_beads": Case(_POURED, [matter.spill_beads]),
+    "pour_water": Case(_POURED, [lambda env: matter.spill(env, "water", 0.3)]),
     "plug_charger": _plugged(0.036),
     "usb_insert": _plugged(0.034),
     "unplug_charger": Case(

@@ -7,6 +7,7 @@ from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_pick import rollout
 from tests.tasks.states import blind, blinding
+from tests.tiers import by_turns
 
 TASKS = [
     "reach",
@@ -30,6 +31,7 @@ TASKS = [
     "flip_switch",
     "plug_charger",
     "pour_beads",
+    "pour_water",
     "unplug_charger",
     "handover",
     "put_away",
@@ -80,13 +82,6 @@ TASKS = [
 ]
 LONG = {"cowork_place", "lab_vial", "mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
 """Episodes of many commands: on MuJoCo in the slow tier, on the others before a release."""
-RUNS = [
-    pytest.param(task, engine, marks=pytest.mark.slow if engine in often else pytest.mark.full)
-    for number, task in enumerate(TASKS)
-    for often in [("mujoco",) if task in LONG else ("mujoco", ("pybullet", "sapien")[number % 2])]
-    for engine in ("mujoco", "pybullet", "sapien")
-]
-"""On MuJoCo and one of the others, by turns, in the slow tier; on all of them before a release."""
 LEAST = {"cowork_place": 5, "wipe_arm": 3, "put_away": 6, "rope_straighten": 4, "go1_velocity": 6}
 """Of eight; where nothing is said seven."""
 
@@ -104,7 +99,7 @@ def test_another_robot_solves_the_task(task: str, robot: str) -> None:
     assert words.count("success") == 4, words
 
 
-@pytest.mark.parametrize(("task", "engine"), RUNS)
+@pytest.mark.parametrize(("task", "engine"), by_turns(TASKS, LONG))
 def test_the_expert_solves_the_task(task: str, engine: str) -> None:
     require_engine(engine)
     with blind(task, engine, 8) as env:

@@ -18,7 +18,8 @@ from anysim.math.compiled import compiled
 PARENT, PRISMATIC, LEADER = range(3)  # columns of `joint_ints` (n, 3)
 AXIS, ORIGIN, REST = 0, 3, 6  # columns of `joint_floats` (n, 15): axis, origin in the parent, rest rotation by rows
 MASS, COM, INERTIA, COMPENSATED = 0, 1, 4, 10  # columns of `bodies` (n + 1, 11); com and inertia in the link's frame
-DAMPING, ARMATURE, STIFFNESS, DRAG, LIMIT, PULL, MULTIPLIER, FEED, BOUND, DRY = range(10)  # columns of `drives`
+DAMPING, ARMATURE, STIFFNESS, DRAG, LIMIT, PULL, MULTIPLIER, FEED, BOUND, DRY, SPRING, RELAXED = range(12)
+"""Columns of `drives` (n, 12)."""
 
 MAX_PASSES = 3
 """Solutions per step: each takes the drives that it finds beyond their limits as constant torques from then on,
@@ -268,18 +269,18 @@ def drive_law(
     """One step of the drives of an articulation.
 
     The law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped, its damping taken at the end of the step if `implicit`,
-    else at the beginning, as if kd were 0 in what follows. The torque is clip(u - dt kd qdd) with
-    (M + A + dt (Kd + D)) qdd = u + f - D qd - c + known + outer. D is the joints' own damping, A their armature, M, c
-    and known are those of `dynamics`. f is dry friction: it stops the joint by the end of the step where that takes no
-    more than its coefficient. A library that knows no armature would hold the bare link, and let go of one with much
-    armature only after the torque has built up over many steps. `outer` is what else acted in the last step (contacts,
-    limits): the momentum M dv/dt + c that the applied forces do not explain. Joints that follow another are coupled in
-    the equation, and the forces of the coupling drop out of it.
+    else at the beginning, as if kd were 0 in what follows. The torque is clip(u - dt kd qdd) with (M + A + dt (Kd + D))
+    qdd = u + f + s - D qd - c + known + outer. D is the joints' own damping, A their armature, s = stiffness (rest - q)
+    their springs at the beginning of the step, M, c and known are those of `dynamics`. f is dry friction: it stops the
+    joint by the end of the step where that takes no more than its coefficient. A library that knows no armature would
+    hold the bare link, and let go of one with much armature only after the torque has built up over many steps. `outer`
+    is what else acted in the last step (contacts, limits): the momentum M dv/dt + c that the applied forces do not
+    explain. Joints that follow another are coupled in the equation, and the forces of the coupling drop out of it.
 
     Args:
-        drives: (n, 10): damping, armature, the stiffness and damping of the drive in its mode, its limit,
+        drives: (n, 12): damping, armature, the stiffness and damping of the drive in its mode, its limit,
             kp q* + kd qd*, the multiplier of a joint that follows another (`LEADER` >= 0), ff, and what bounds
-            kp (q* - q) + kd qd*, and dry friction.
+            kp (q* - q) + kd qd*, dry friction, and a spring's stiffness and rest.
         memory: of the last step: 1 if it holds one, velocity, c - applied, M. Brought up to date.
         out: (2 n + 6): torques for the joints, efforts of the drives, force and moment on a free root's origin.
 
@@ -314,8 +315,9 @@ def drive_law(
         else:
             column[v] = free
             free += 1
-    pull, drag = np.empty(n), np.empty(n)
+    pull, drag, spring = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
+        spring[i] = drives[i, SPRING] * (drives[i, RELAXED] - motion[0, i])
         asked = drives[i, PULL] - drives[i, STIFFNESS] * motion[0, i]
         asked = min(max(asked, -drives[i, BOUND]), drives[i, BOUND])
         pull[i] = asked + drives[i, FEED] - drives[i, DRAG] * motion[1, i]
@@ -343,7 +345,8 @@ def drive_law(
             row = column[leader[r]]
             total = known[r] + outer[r] - bias[r]
             if r >= first:
-                total += pull[r - first] + rub[r - first] - drives[r - first, DAMPING] * motion[1, r - first]
+                passive = drives[r - first, DAMPING] * motion[1, r - first]
+                total += pull[r - first] + rub[r - first] - passive + spring[r - first]
             right[row] += factor[r] * total
             for c in range(size):
                 entry = matrix[r, c]
@@ -380,6 +383,7 @@ def drive_law(
         slowed = motion[1, i] + dt * gained[v]
         rubbed = rub[i] - dt * grip[i] * gained[v]
         out[i] = effort[i] + rubbed - drives[i, DAMPING] * slowed - drives[i, ARMATURE] * gained[v] + known[v]
+        out[i] += spring[i]
         out[n + i] = effort[i]
     memory[0] = 1.0
     for r in range(size):

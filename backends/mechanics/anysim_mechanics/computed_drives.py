@@ -21,7 +21,7 @@ class DriveArrays:
     """Arrays of the drive law: per joint, per body, and what the last step left.
 
     Attributes:
-        drives: (N, J, 10), bodies: (N, B, 11): see the columns in `articulation`.
+        drives: (N, J, 12), bodies: (N, B, 11): see the columns in `articulation`.
         damping: (N, B, 2) [1/s] of free bodies. gravity: (N, 3) [m/s^2].
         memory: (N, L), a row per env, part of its state. roots: (N, B, 7) poses of roots that stand still.
         acting: what the law uses: `drives`, or a copy in which some joints are left to the library.
@@ -31,11 +31,13 @@ class DriveArrays:
         n, bodies, joints = num_envs, world.bodies, world.joints
         self.trees, self.gains = trees, DriveGains(world, n)
         self.implicit = world.physics.actuation is not Actuation.EXPLICIT_PD
-        self.drives = np.zeros((n, len(joints), 10))
+        self.drives = np.zeros((n, len(joints), 12))
         self.drives[:, :, K.DAMPING] = [j.damping for j in joints]
         self.drives[:, :, K.ARMATURE] = [j.armature for j in joints]
         self.drives[:, :, [K.LIMIT, K.BOUND]] = np.inf
         self.drives[:, :, K.DRY] = [j.friction for j in joints]
+        self.drives[:, :, K.SPRING] = [j.stiffness for j in joints]
+        self.drives[:, :, K.RELAXED] = [j.spring_rest for j in joints]
         for tree in trees:
             self.drives[:, tree.joints, K.MULTIPLIER] = tree.multiplier
         self.acting = self.drives
@@ -64,11 +66,13 @@ class DriveArrays:
         """Which trees the law acts on, where the library's own motors move all but the joints that are `loose` (J,)."""
         law = np.any(self.drives[:, :, [K.DAMPING, K.ARMATURE]] != 0, axis=(0, 2))
         law[self.gains.joint] = True
+        sprung: Array = np.any(self.drives[:, :, K.SPRING] != 0, axis=0)
         damped: Array = np.any(self.damping != 0, axis=(0, 2))
         lifted = self.lifted()
         return [
             bool(
                 (law & loose)[t.joints].any()
+                or sprung[t.joints].any()
                 or damped[t.bodies].any()
                 or (lifted[t.bodies].any() and (t.free or loose[t.joints].any()))
             )
@@ -103,7 +107,7 @@ class TreeDrives:
         self.wrench = np.zeros((n + 1, 6)) if wrench is None else wrench[tree.bodies]
         self.motion, self.root, out = np.zeros((2, n)), np.zeros(13), np.zeros(2 * n + 6)
         self.root[:7] = arrays.roots[env, tree.bodies[0]]
-        self.torque, self.effort, self.base = np.split(out, [n, 2 * n])
+        self.torque, self.effort, self.base = out[:n], out[n : 2 * n], out[2 * n :]
         self.lift = -bodies[0, K.MASS] * bodies[0, K.COMPENSATED] * gravity
         constants = dt, arrays.implicit, tree.joint_ints, tree.joint_floats, bodies, arrays.acting[env, tree.joints]
         state = self.wrench, gravity, self.root, self.motion, tree.first, arrays.remembered(env, tree.number)

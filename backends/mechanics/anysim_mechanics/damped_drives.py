@@ -1,12 +1,12 @@
 """Drives whose damping a library's solver takes, as a constraint that it meets together with contacts and limits.
 
-The law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped, with its damping taken implicitly. Each substep
-kp (q* - q) + kd qd* + ff goes into the library as a force, and the damping as the library's own drive. So a free joint
-moves as MuJoCo's `implicitfast` moves it, and a blocked one exerts all of its command; a law computed outside from mass
-matrix and bias alone would lose most of it. Where the law exceeds the effort limit at the present speed, the library
-clips it instead, at the speed that it ends with: the drive gets the law as damping towards a velocity, and the limit. A
-clipped force given from outside would set stiff joints swinging. With `actuation: explicit_pd` the force is the law of
-the state at the beginning of the substep.
+The law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped, with its damping taken implicitly; a joint's spring adds to
+it. Each substep kp (q* - q) + kd qd* + ff goes into the library as a force, and the damping as the library's own drive.
+So a free joint moves as MuJoCo's `implicitfast` moves it, and a blocked one exerts all of its command; a law computed
+outside from mass matrix and bias alone would lose most of it. Where the law exceeds the effort limit at the present
+speed, the library clips it instead, at the speed that it ends with: the drive gets the law as damping towards a
+velocity, and the limit. A clipped force given from outside would set stiff joints swinging. With
+`actuation: explicit_pd` the force is the law of the state at the beginning of the substep.
 
 Kernels that call each other share one file because numba's cache notices a change of a kernel's own file only. None is
 compiled with fast-math, and none adds in an order that depends on the number of envs: an env's bits are its own.
@@ -24,8 +24,9 @@ from anysim.model.world import Actuation, World
 from anysim_mechanics.drive_gains import DriveGains
 from anysim_mechanics.journal import Journal, Op
 
-PUSH, FEED, STIFFNESS, DAMPING, BOUND, ASKED, PASSIVE, GIVEN = range(8)
-"""Rows of a law (N, 8, J); `ASKED` bounds what the targets ask for, `GIVEN` is what the last substep was given."""
+PUSH, FEED, STIFFNESS, DAMPING, BOUND, ASKED, PASSIVE, GIVEN, SPRING, RELAXED = range(10)
+"""Rows of a law (N, 10, J); `ASKED` bounds what the targets ask for, `GIVEN` is what the last substep was given, and
+`SPRING` and `RELAXED` are the stiffness and the rest of a joint's own spring."""
 
 _TERMS = np.array([STIFFNESS, DAMPING, PUSH, FEED, ASKED, BOUND])
 """Rows that follow from commands and gains, in the order of `DriveGains.write`."""
@@ -42,7 +43,8 @@ class DampedDrives:
 
     Attributes:
         gains, passive: what may be changed: the drives' gains, and the joints' own damping (N, J).
-        control: the present commands, None before any. law: (N, 8, J) that of each joint.
+        control: the present commands, None before any. law: (N, 10, J) that of each joint.
+        springs: (2, J) stiffness and rest of each joint's own spring.
         told: (N, ...) what the library has been told of the drives of each env; not a number where nothing yet.
     """
 
@@ -54,6 +56,7 @@ class DampedDrives:
             if driven.count(joint) > 1:
                 raise EngineError(f"joint '{joints[joint].name}' has two drives; this engine takes one per joint")
         self.passive = np.tile(np.array([j.damping for j in joints], dtype=float), (num_envs, 1))
+        self.springs = np.array([[j.stiffness for j in joints], [j.spring_rest for j in joints]])
         self.control: Control | None = None
         self._commanded, self._tuned = 0, 0  # how often commands, and gains, were written
         self.kind = {Actuation.EXPLICIT_PD: EXPLICIT, Actuation.NATIVE: NATIVE}.get(world.physics.actuation, LAW)
@@ -76,8 +79,9 @@ class DampedDrives:
 
     def _update(self) -> None:
         """Make the law: a new array, since efforts of the last substep may yet be asked for."""
-        self.law = np.zeros((len(self.passive), 8, self.passive.shape[1]))
+        self.law = np.zeros((len(self.passive), 10, self.passive.shape[1]))
         self.law[:, BOUND : ASKED + 1], self.law[:, PASSIVE] = np.inf, self.passive
+        self.law[:, SPRING : RELAXED + 1] = self.springs
         if self.control is not None:
             self.gains.write(self.control, self.law, _TERMS)
 
@@ -173,7 +177,7 @@ def substep(
     """The law of an articulation's joints at their present state, and what the library does not know of them yet.
 
     Args:
-        law: (N, 8, J); its row GIVEN is written.
+        law: (N, 10, J); its row GIVEN is written.
         joints: (n,) the World's of each degree of freedom.
         position: (n,), velocity: (n,) float32.
         kind: EXPLICIT, where damping is in the force, or LAW.
@@ -202,7 +206,7 @@ def substep(
                     limit = max(bound - (passive if whole > 0.0 else -passive) * speed, 0.0)
                     target = push / slowing
         law[env, GIVEN, j] = given
-        force[k] = exerted
+        force[k] = exerted + law[env, SPRING, j] * (law[env, RELAXED, j] - float(position[k]))
         what = 0
         if slowing != told[env, 0, j] or limit != told[env, 1, j]:
             what |= GAINS
@@ -266,7 +270,7 @@ def native_targets(
 
 @compiled
 def native_terms(position: Array, velocity: Array, joint: Array, law: Array, unbounded: float, wanted: Array) -> None:
-    """Write terms (N, J, 6) of a library's own drives, as in `changes`, for commands (N, A) and the law (N, 8, J)."""
+    """Write terms (N, J, 6) of a library's own drives, as in `changes`, for commands (N, A) and the law (N, 10, J)."""
     for e in range(wanted.shape[0]):
         for j in range(wanted.shape[1]):
             wanted[e, j, :] = 0.0

@@ -137,6 +137,8 @@ def _joint(element: Any, joint: Joint, world: World) -> Any:
         pos=joint.anchor,
         armature=joint.armature,
         damping=[joint.damping, 0.0, 0.0],
+        stiffness=[joint.stiffness, 0.0, 0.0],
+        springref=joint.spring_rest,
         frictionloss=joint.friction,
         solref_friction=stiff,
         solimp_friction=DRY_IMPEDANCE,

@@ -96,9 +96,8 @@ class Envs(EnvWorlds):
         """Give Bullet the joints and roots that the mirror has."""
         cast = self.clients[env].cast
         self._set_joints(env, cast.joints)
-        for tree in cast.trees:
-            if statics or tree.free:
-                self._set_root(env, int(tree.bodies[0]), with_pose=True)
+        roots = [int(tree.bodies[0]) for tree in cast.trees if statics or tree.free]
+        self._set_roots(env, np.array(roots, dtype=int), with_pose=True)
         self.mirror.hold(env)
 
     def populate(self, env: int, present: Array) -> None:
@@ -142,9 +141,9 @@ class Envs(EnvWorlds):
         if self.lost[env] or not client.part():
             self.lost[env] = True
             self._renew(env, client.cast)
-        for body in self._static[client.cast.bodies[self._static]].tolist():
-            self.mirror.pose[env, body] = pose[body]
-            self._set_root(env, body, with_pose=True)
+        fixed = self._static[client.cast.bodies[self._static]]
+        self.mirror.pose[env, fixed] = pose[fixed]
+        self._set_roots(env, fixed, with_pose=True)
 
     def _rebuild(self, env: int) -> None:
         """Build an env anew, in its present state: for what Bullet reads once. It has forgotten its contacts."""
@@ -193,8 +192,7 @@ class Envs(EnvWorlds):
             self.mirror.pose[env, bodies] = pose
         if twist is not None:
             self.mirror.twist[env, bodies] = twist
-        for body in bodies.tolist():
-            self._set_root(env, body, with_pose=pose is not None)
+        self._set_roots(env, bodies, with_pose=pose is not None)
         self._wrote(env, bodies)
 
     def _wrote(self, env: int, bodies: Array) -> None:
@@ -208,19 +206,26 @@ class Envs(EnvWorlds):
             uid, link = client.body_at[self.world.joints[j].body][0], client.joint_link[j]
             p.resetJointState(uid, link, position[j], velocity[j], physicsClientId=client.id)
 
-    def _set_root(self, env: int, body: int, with_pose: bool) -> None:
-        """Give Bullet the pose of a root's centre of mass, and its velocity, which writing a pose makes zero."""
-        p, client, pose = bullet(), self.clients[env], self.mirror.pose[env, body]
-        uid, local = client.body_at[body][0], client.local[body, :7]
-        if with_pose:
-            place = P.compose(pose, local)
-            p.resetBasePositionAndOrientation(uid, place[:3].tolist(), place[3:].tolist(), physicsClientId=client.id)
-        if self.world.bodies[body].kind is BodyKind.STATIC:
-            self.laws.roots[env, body] = pose
-            return
-        twist = self.mirror.twist[env, body]
-        speed = twist[:3] + P.cross(twist[3:], P.rotate(pose[3:], local[:3]))
-        p.resetBaseVelocity(uid, speed.tolist(), twist[3:].tolist(), physicsClientId=client.id)
+    def _set_roots(self, env: int, bodies: Array, with_pose: bool) -> None:
+        """Give Bullet poses of roots' centres of mass, and their velocities, which writing a pose makes zero."""
+        p, client, poses, twists = (
+            bullet(),
+            self.clients[env],
+            self.mirror.pose[env, bodies],
+            self.mirror.twist[env, bodies],
+        )
+        local = client.local[bodies, :7]
+        places = P.compose(poses, local).tolist() if with_pose else []
+        arms = P.rotate(poses[:, 3:], local[:, :3])
+        speeds, rates = (twists[:, :3] + P.cross(twists[:, 3:], arms)).tolist(), twists[:, 3:].tolist()
+        for row, body in enumerate(bodies.tolist()):
+            uid = client.body_at[body][0]
+            if with_pose:
+                p.resetBasePositionAndOrientation(uid, places[row][:3], places[row][3:], physicsClientId=client.id)
+            if self.world.bodies[body].kind is BodyKind.STATIC:
+                self.laws.roots[env, body] = poses[row]
+            else:
+                p.resetBaseVelocity(uid, speeds[row], rates[row], physicsClientId=client.id)
 
     # ------------------------------------------------------------------ snapshots
 

@@ -1,7 +1,7 @@
 """The drives of all envs: which articulations need the computed law, and how Bullet is given what it says.
 
-See `anysim_mechanics.computed_drives` for the law. An articulation without drives, damping, armature, compensated
-gravity or a wrench is left to Bullet alone.
+See `anysim_mechanics.computed_drives` for the law. An articulation without drives, damping, springs, armature,
+compensated gravity or a wrench is left to Bullet alone.
 """
 
 from typing import Any, NamedTuple
@@ -21,8 +21,8 @@ from anysim_pybullet.client import Env
 from anysim_pybullet.lift import Lifter
 from anysim_pybullet.motors import Motors
 
-_ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1, 0], dtype=float)
-"""Takes everything away from the drive of a joint that a motor moves, but limits and its multiplier."""
+_ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1, 0, 1, 1], dtype=float)
+"""Takes everything away from the drive of a joint that a motor moves, but limits, its multiplier and its spring."""
 
 
 class Laws(DriveArrays):
@@ -106,12 +106,18 @@ class Laws(DriveArrays):
 
 
 class _Task(NamedTuple):
-    """An articulation that the law acts on, its Bullet body and links, and what brakes its root."""
+    """An articulation that the law acts on, its Bullet body and links, and what brakes its root.
+
+    A free body without joints that nothing brakes is pushed with the same `force` and `torque` in every step of a call;
+    those that are zero are empty.
+    """
 
     law: TreeDrives
     uid: int
     links: list[int]
     brake: "Brake | None"
+    force: list[float] | None
+    torque: list[float]
 
 
 class Pusher:
@@ -127,7 +133,12 @@ class Pusher:
             acts = (laws.needs[tree.number] or pushed) and (tree.free or len(tree.joints) > 0)
             if acts:
                 law, brake = TreeDrives(laws, index, tree, wrench, dt), Brake.of(laws, p, env, index, tree, dt)
-                self._work.append(_Task(law, env.root_ids[tree.number], env.tree_links[tree.number], brake))
+                uid, links = env.root_ids[tree.number], env.tree_links[tree.number]
+                if tree.free and not links and brake is None:
+                    outer = law.wrench[0, :3] + law.lift, law.wrench[0, 3:]
+                    self._work.append(_Task(law, uid, links, brake, *(v.tolist() if v.any() else [] for v in outer)))
+                else:
+                    self._work.append(_Task(law, uid, links, brake, None, []))
             elif laws.lifts[tree.number]:
                 lifted.append(tree)
             if laws.rubs:
@@ -147,21 +158,28 @@ class Pusher:
                 return False
             p.stepSimulation(physicsClientId=client)
         for law, *_ in self._work:
-            self._laws.effort[self._index, law.tree.joints] = law.effort
+            if len(law.tree.joints):
+                self._laws.effort[self._index, law.tree.joints] = law.effort
             if not self._laws.needs[law.tree.number]:  # only its wrench asked for the law, and that ends with this call
                 self._laws.forget(self._index, np.array([law.tree.number]))
         return True
 
     def _push(self, p: Any, client: int, task: _Task) -> bool:
-        law, uid, links, brake = task
+        law, uid, links, brake, force, torque = task
+        if force is not None:
+            if force:
+                place, _ = p.getBasePositionAndOrientation(uid, physicsClientId=client)
+                p.applyExternalForce(uid, -1, force, place, p.WORLD_FRAME, physicsClientId=client)
+            if torque:
+                p.applyExternalTorque(uid, -1, torque, p.WORLD_FRAME, physicsClientId=client)
+            return True
         place: Any = None
         if law.tree.free:
             place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
             if not links:
-                wrench = law.wrench[0]
-                if brake is not None:
-                    velocity = p.getBaseVelocity(uid, physicsClientId=client)
-                    wrench = wrench + brake.wrench(np.array(turn), *map(np.array, velocity))
+                assert brake is not None
+                velocity = p.getBaseVelocity(uid, physicsClientId=client)
+                wrench = law.wrench[0] + brake.wrench(np.array(turn), *map(np.array, velocity))
                 self._outer(p, client, uid, place, wrench[:3] + law.lift, wrench[3:])
                 return True
             velocity = p.getBaseVelocity(uid, physicsClientId=client)
@@ -173,11 +191,10 @@ class Pusher:
         law.motion[1] = [s[1] for s in states]
         if not law.solve():
             return False
-        torque = law.torque.tolist()
-        p.setJointMotorControlArray(uid, links, p.TORQUE_CONTROL, forces=torque, physicsClientId=client)
+        p.setJointMotorControlArray(uid, links, p.TORQUE_CONTROL, forces=law.torque.tolist(), physicsClientId=client)
         if law.tree.free and law.base.any():
-            force, arm = law.base[:3], np.array(place) - law.root[:3]
-            self._outer(p, client, uid, place, force, law.base[3:] - np.cross(arm, force))
+            pull, arm = law.base[:3], np.array(place) - law.root[:3]
+            self._outer(p, client, uid, place, pull, law.base[3:] - np.cross(arm, pull))
         return True
 
     @staticmethod

@@ -50,6 +50,7 @@ class NativeDrives(D.DampedDrives):
 
     def __init__(self, world: World, num_envs: int) -> None:
         self.wanted = np.zeros((num_envs, len(world.joints), 6))
+        self._sprung = any(joint.stiffness for joint in world.joints)
         super().__init__(world, num_envs, np.full_like(self.wanted, np.nan))
 
     def _update(self) -> None:
@@ -79,7 +80,11 @@ class NativeDrives(D.DampedDrives):
                 tree.handle.set_qf(self.wanted[env, tree.joints, 5].astype(np.float32))
 
     def substep(self, env: int, scene: EnvScene) -> None:
-        """Before a substep: nothing, PhysX has all of the law."""
+        """Before a substep: the force of springs; PhysX has all of the law."""
+        for tree in scene.trees if self._sprung else ():
+            stiffness, rest = self.springs[:, tree.joints]
+            fed = self.wanted[env, tree.joints, 5] + stiffness * (rest - tree.handle.get_qpos())
+            tree.handle.set_qf(fed.astype(np.float32))
 
 
 Drives = LawDrives | NativeDrives

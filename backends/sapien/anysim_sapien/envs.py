@@ -20,7 +20,7 @@ from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.contacts import pairs_of
 from anysim_sapien.drives import drives_of
 from anysim_sapien.momentum import Momentum
-from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twists_of
+from anysim_sapien.motion import Motion, motion_of, put_motion, put_twists, twists_of
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.parameters import Parameters
 from anysim_sapien.raw import raw_loop
@@ -142,8 +142,7 @@ class Envs(EnvWorlds):
                 scene.place_body(int(body), place)
             turn = scene.poses()[bodies, 3:]
         if twist is not None:
-            for column in np.flatnonzero(moved):
-                put_twist(scene, int(bodies[column]), twist[column], turn[column])
+            put_twists(scene, bodies[moved], twist[moved], turn[moved])
         self._bound(env)
 
     # ------------------------------------------------------------------ snapshots

@@ -49,6 +49,8 @@ def twists_of(scene: EnvScene, bodies: Array, turn: Array) -> Array:
     return np.concatenate([velocity[:, :3] - P.cross(rate, P.rotate(turn, scene.com[bodies])), rate], axis=-1)
 
 
-def put_twist(scene: EnvScene, body: int, twist: Array, turn: Array) -> None:
-    """Write a root's twist (6,), as `twists_of` returns it, at its orientation (4,)."""
-    scene.push_body(body, twist[:3] + P.cross(twist[3:], P.rotate(turn, scene.com[body])), twist[3:])
+def put_twists(scene: EnvScene, bodies: Array, twists: Array, turn: Array) -> None:
+    """Write twists (K, 6) of free roots, as `twists_of` returns them, at their orientations (K, 4)."""
+    linear = twists[:, :3] + P.cross(twists[:, 3:], P.rotate(turn, scene.com[bodies]))
+    for row, body in enumerate(bodies.tolist()):
+        scene.push_body(body, linear[row], twists[row, 3:])

@@ -7,6 +7,7 @@ puts it into a World under an entity's name. Importers of other formats are entr
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from enum import StrEnum
 from math import isinf, isnan
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
@@ -26,6 +27,16 @@ class ImportNote(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message} ({self.kind})"
+
+
+class Fate(StrEnum):
+    """What becomes of an element or an attribute of a file, in the tables of importers."""
+
+    EXACT = "exact"
+    APPROXIMATED = "approximated"  # a note says where, if it matters there
+    REFUSED = "refused"  # with an error that names it
+    LEFT_OUT = "left out"  # with a note
+    HARMLESS = "cannot matter"  # no note: nothing that is simulated depends on it
 
 
 class ActuatorHint(NamedTuple):

@@ -22,6 +22,7 @@ class Capability(StrEnum):
     SHAPE_MESH = "shape: mesh (convex)"
     MIMIC_JOINTS = "mimic joints"
     JOINT_FRICTION = "joint friction"
+    JOINT_SPRINGS = "joint springs"
     ARMATURE = "armature"
     JOINT_LIMITS = "joint limits"
     EFFORT_LIMITS = "effort limits"

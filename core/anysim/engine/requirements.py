@@ -111,6 +111,7 @@ def _of_joint(world: World, joint: Joint) -> Rows:
     return (
         (C.MIMIC_JOINTS, joint.mimic is not None, f"follows '{leader}'"),
         (C.JOINT_FRICTION, joint.friction > 0, "has dry friction"),
+        (C.JOINT_SPRINGS, joint.stiffness != 0, "has a spring"),
         (C.ARMATURE, joint.armature > 0, "has armature"),
         (C.JOINT_LIMITS, isfinite(joint.lower) or isfinite(joint.upper), "is limited"),
     )

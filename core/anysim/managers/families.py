@@ -1,6 +1,6 @@
 """FamilyManager: the families of a world through the life of its envs, and all that they remember."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TypeVar
 
 import numpy as np
@@ -129,6 +129,11 @@ class FamilyManager(Manager):
         family = self.family(name)
         with self._blames[name]:
             return family.state(self._everyone if env_ids is None else env_ids)
+
+    def points(self, name: str) -> Callable[[Array], FamilyState] | None:
+        """What gives the state of a family of matter in some envs; None where the name is of no such family."""
+        family = self._families.get(name)
+        return family.state if family is not None and family.drawn else None
 
     def facts(self, env: int) -> dict[str, Mapping[str, object]]:
         """What the families of an env say of their entities, by entity."""

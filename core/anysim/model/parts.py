@@ -109,7 +109,8 @@ class Joint:
     """One degree of freedom that moves `body` against its parent, about or along `axis` through `anchor`.
 
     Units are [rad] or [m]; `axis` (unit) and `anchor` are in the body's frame; `friction` is dry friction [N m] or [N],
-    `armature` the rotor's inertia at the joint. `initial` is the position after a reset.
+    `armature` the rotor's inertia at the joint. `initial` is the position after a reset. A spring pulls with
+    `stiffness` [N m/rad] or [N/m] times the way to `spring_rest`, beside the drive and its limit.
     """
 
     name: str
@@ -127,6 +128,8 @@ class Joint:
     initial: float = 0.0
     mimic: Mimic | None = None
     limit_softness: float = 0.0  # time constant [s] of the limit and mimic constraints; 0 leaves it to the engine
+    stiffness: float = field(default=0.0, metadata=HASHED_IF_GIVEN)
+    spring_rest: float = field(default=0.0, metadata=HASHED_IF_GIVEN)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 Which body that is, is looked up by env when the entities there have changed, at resets; a step only gathers.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from anysim.compile.variants import INSTANCER
 from anysim.conventions import Array
 from anysim.errors import NameLookupError, listing
+from anysim.families.base import FamilyState
 from anysim.math import pose as P
 from anysim.model.frames import FixedFrame, frames_of
 from anysim.model.slots import ABSENT, members
@@ -133,19 +134,53 @@ class Follower:
         return twists
 
 
+class Points:
+    """The points of a family's matter as a Follower has things; their axes are the world's."""
+
+    def __init__(self, scene: "SceneView", state: Callable[[Array], FamilyState], name: str) -> None:
+        self._state, self._scene = state, scene
+        self.names = tuple(f"{name}.{i}" for i in range(self._now().points.shape[1]))
+
+    def _now(self) -> FamilyState:
+        return self._state(self._scene.env_ids)
+
+    @property
+    def present(self) -> Array:
+        """(n, K) bool: which of them are there."""
+        now = self._now()
+        return np.asarray(now.fields.get("there", np.ones(now.points.shape[:2], dtype=bool)))
+
+    @property
+    def poses(self) -> Array:
+        """(n, K, 7) in the world frame."""
+        here = np.broadcast_to(_HERE, (len(self._scene.env_ids), len(self.names), 7))
+        return np.concatenate([np.where(self.present[..., None], self._now().points, 0.0), here[..., 3:]], axis=-1)
+
+    @property
+    def twists(self) -> Array:
+        """(n, K, 6) [m/s]: velocities, and no rates."""
+        moving = np.where(self.present[..., None], self._now().velocities, 0.0)
+        return np.concatenate([moving, np.zeros_like(moving)], axis=-1)
+
+
 class CategoryView:
-    """All instances of a category, or of an instancer; K is the same in every env. In YAML: its name."""
+    """All instances of a category or an instancer, or all particles of a family; K is the same in every env.
+
+    In YAML: its name.
+    """
 
     reference_kind = "category"
 
     def __init__(self, scene: "SceneView", name: str) -> None:
         world = scene.engine.world
+        self._moment, self._poses, self._scene, self.name = -1, np.zeros((0, 0, 7)), scene, name
+        if scene.families is not None and (points := scene.families.points(name)) is not None:
+            self._follower: Follower | Points = Points(scene, points, name)
+            return
         if not members(world, name.partition(".")[0]):
             known = list(world.categories)
             raise NameLookupError(f"there is no category '{name}' (categories: {listing(known)})")
-        self.name = name
         self._follower = Follower(scene, columns_of(world, name))
-        self._moment, self._poses, self._scene = -1, np.zeros((0, 0, 7)), scene
 
     def __len__(self) -> int:
         """The number of instances K."""

@@ -74,6 +74,7 @@ class NullEngine(SimEngine):
                     C.TERRAIN_TRIMESH,
                     C.SHAPE_MESH,
                     C.JOINT_FRICTION,
+                    C.JOINT_SPRINGS,
                     C.ARMATURE,
                     C.EFFORT_LIMITS,
                     C.ACTUATION_EXPLICIT,

@@ -9,7 +9,7 @@ import pytest
 
 from anysim.engine.capability import Capability as C
 from anysim.math import pose as P
-from anysim.model.world import Box, Capsule, ControlMode, Cylinder, Sphere, Surface
+from anysim.model.world import Actuation, Box, Capsule, ControlMode, Cylinder, Sphere, Surface
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio
 from anysim.testing.fixtures import needs
@@ -123,6 +123,53 @@ def test_pendulum_period(build, amplitude):
     assert len(crossings) >= 2
     assert_ratio(np.diff(crossings).mean(), wanted, tolerances.PERIOD, "period")
     assert_ratio(angle[-1500:].max(), amplitude, 4 * tolerances.ENERGY, "amplitude 3 s later")
+
+
+@needs(C.JOINT_SPRINGS)
+def test_a_spring_swings_about_its_rest(build):
+    """T = 2 pi sqrt(m / k) about the rest, and energy stays: no engine damps a spring, or takes it for a drive."""
+    mass, stiffness, rest, dt = 2.0, 50.0, 0.2, 0.001
+    engine = build(worlds.slider(drive=False, mass=mass, stiffness=stiffness, spring_rest=rest, dt=dt))
+    swing, speeds = [-rest], [0.0]
+    for _ in range(3000):
+        engine.step()
+        state = engine.get_state()
+        swing.append(float(state.joint_pos[0, 0]) - rest)
+        speeds.append(float(state.joint_vel[0, 0]))
+    way, speed = np.array(swing), np.array(speeds)
+    down = np.flatnonzero((way[:-1] > 0) & (way[1:] <= 0))
+    crossings = (down + way[down] / (way[down] - way[down + 1])) * dt
+    assert len(crossings) == 2
+    assert_ratio(np.diff(crossings).mean(), 2 * np.pi * sqrt(mass / stiffness), tolerances.PERIOD, "period")
+    energy = 0.5 * mass * speed**2 + 0.5 * stiffness * way**2
+    start = 0.5 * stiffness * rest**2
+    assert_close(energy, np.full(len(energy), start), tolerances.ENERGY * start, "energy over 3 s")
+
+
+@needs(C.JOINT_SPRINGS, C.CONTROL_POSITION)
+@pytest.mark.parametrize("limit", [np.inf, 3.0])
+def test_a_spring_pulls_beside_the_drive(build, limit):
+    """At rest kp (q* - q) = k (q - q0), or the effort limit, which bounds the drive and not the spring."""
+    kp, stiffness, rest = 100.0, 50.0, -0.1
+    joint: dict[str, Any] = {"stiffness": stiffness, "spring_rest": rest, "damping": 20.0}
+    engine = build(worlds.slider(ControlMode.POSITION, kp, 30.0, limit, **joint))
+    engine.set_control(position=0.2)
+    engine.step(3000)
+    state, wanted = engine.get_state(), (kp * 0.2 + stiffness * rest) / (kp + stiffness)
+    if np.isfinite(limit):
+        wanted = rest + limit / stiffness
+    assert_close(state.joint_pos[0, 0], wanted, tolerances.AT_REST, "position at rest")
+    assert_close(state.joint_effort[0, 0], stiffness * (wanted - rest), tolerances.AT_REST * kp, "effort of the drive")
+
+
+@needs(C.JOINT_SPRINGS, C.CONTROL_EFFORT, C.ACTUATION_NATIVE)
+def test_a_spring_pulls_under_native_actuation(build):
+    """It is no part of a drive, nor of one that the engine computes: 3 N hold it 3 / k from its rest."""
+    world = worlds.slider(stiffness=50.0, spring_rest=-0.1, damping=20.0)
+    engine = build(worlds.actuated(world, Actuation.NATIVE))
+    engine.set_control(effort=3.0)
+    engine.step(3000)
+    assert_close(engine.get_state().joint_pos[0, 0], -0.1 + 3.0 / 50.0, tolerances.AT_REST, "position at rest")
 
 
 def test_double_pendulum_keeps_its_energy(build):

@@ -15,6 +15,7 @@ class AgentLimits:
     Attributes:
         yaml_bytes: of a world of its own.
         things: objects, robots and instances of such a world together.
+        families: of such a world; each has limits of its own.
         cameras: of such a world.
         pixels: of one of its cameras, and of one image that is asked for.
         substeps: physics steps of one of its control steps.
@@ -28,6 +29,7 @@ class AgentLimits:
 
     yaml_bytes: int = 64 << 10
     things: int = 200
+    families: int = 8
     cameras: int = 8
     pixels: int = 1 << 20
     substeps: int = 200

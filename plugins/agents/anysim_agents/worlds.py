@@ -233,6 +233,8 @@ def _beyond(loaded: LoadedRun, limits: AgentLimits) -> Iterator[SpecIssue]:
         yield issue(
             "world.objects", f"{count} robots and objects; at most {limits.things} are taken, instances counted"
         )
+    if len(world.families or ()) > limits.families:
+        yield issue("world.families", f"{len(world.families or ())} families; at most {limits.families} are taken")
     if len(world.cameras) > limits.cameras:
         yield issue("world.cameras", f"{len(world.cameras)} cameras; at most {limits.cameras} are taken")
     for name, camera in world.cameras.items():

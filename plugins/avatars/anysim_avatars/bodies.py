@@ -8,7 +8,7 @@ import numpy as np
 from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.model.world import Body, BodyKind, Capsule, Geom, Inertial, Quat, Site, Surface, Vec3
+from anysim.model.world import Body, BodyKind, Capsule, Geom, Inertial, Mesh, Quat, Site, Surface, Vec3
 
 BONES = (
     "pelvis",
@@ -47,6 +47,10 @@ _CLOTHES = (
     (0.25, 0.26, 0.30),
     (0.78, 0.78, 0.76),
 )
+
+
+Look = tuple[tuple[Mesh, ...], tuple[Geom, ...]]
+"""Meshes, and what is drawn of them on the links."""
 
 
 class Proportions(NamedTuple):
@@ -163,8 +167,8 @@ def sites(one: Proportions) -> tuple[Site, ...]:
     return tuple(sites)
 
 
-def model(name: str, one: Proportions, poses: Array) -> ImportedModel:
-    """The bodies of an avatar, at poses (15, 7) of its links in the world."""
+def model(name: str, one: Proportions, poses: Array, look: Look | None = None) -> ImportedModel:
+    """The bodies of an avatar, at poses (15, 7) of its links; a `look` is drawn in place of the capsules."""
     skin, shirt, trousers = one.colors
     color = {"head": skin, "hand": skin, "forearm": skin, "torso": shirt, "arm": shirt, "foot": (0.15, 0.13, 0.12)}
     bodies: list[Body] = []
@@ -185,17 +189,21 @@ def model(name: str, one: Proportions, poses: Array) -> ImportedModel:
         )
         shown = next((c for part, c in color.items() if BONES[bone].endswith(part)), trousers)
         touch = Surface(friction=0.7)
-        geoms.append(Geom(BONES[bone], bone, Capsule(radius, half), place, turn, (*shown, 1.0), touch))
-        if bone == 2:
+        seen = look is None
+        geoms.append(Geom(BONES[bone], bone, Capsule(radius, half), place, turn, (*shown, 1.0), touch, visible=seen))
+        if bone == 2 and seen:
             nose = Capsule(0.018, 0.012)
             front = (float(radius), 0.0, place[2])
             geoms.append(Geom("nose", bone, nose, front, color=(*skin, 1.0), collides=False))
+    meshes, skin_of = ((), ()) if look is None else look
+    geoms += skin_of
     links = {"": 0} | {bone: i for i, bone in enumerate(BONES) if i}
     return ImportedModel(
         name,
         tuple(bodies),
         geoms=tuple(geoms),
         geom_links=tuple(BONES[g.body] if g.body else "" for g in geoms),
+        meshes=meshes,
         sites=sites(one),
         links=links,
     )

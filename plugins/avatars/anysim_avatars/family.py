@@ -17,6 +17,7 @@ from anysim_avatars.actions import LENGTH, WIDTH, Column, Kind
 from anysim_avatars.bodies import BONES, Proportions, proportions
 from anysim_avatars.facts import facts_of
 from anysim_avatars.gait import STRETCH, Gait, Legs, Wish, advance, carrot, stand
+from anysim_avatars.look import shapes
 from anysim_avatars.motion import Motion, Provider, between, read_motion
 from anysim_avatars.puppet import Aim, Figure, Sizes, figure, posed
 from anysim_avatars.spec import ActionSpec, AvatarSpec
@@ -49,7 +50,8 @@ class Avatars(Family):
             gait.hips[:] -= posture[:, clips.DROP]
             poses = figure(gait, Sizes.of([one], 1), _aim(posture)).poses[0]
             called = name if spec.count == 1 else f"{name}_{number}"
-            yield FamilyPart(called, bodies.model(called, one, poses), "person", driven=True)
+            shown = shapes(one) if spec.look == "body" else None
+            yield FamilyPart(called, bodies.model(called, one, poses, shown), "person", driven=True)
 
     # ------------------------------------------------------------------ made
 

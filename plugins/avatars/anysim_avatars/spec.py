@@ -56,6 +56,9 @@ class AvatarSpec(Spec):
 
     count: Integer = Field(default=1, gt=0, le=32, description="how many; they are called NAME_0, NAME_1, …")
     seed: Integer = Field(default=0, ge=0, lt=2**32, description="draws size, proportions and colours of each")
+    look: Literal["capsules", "body"] = Field(
+        default="capsules", description="what is drawn: the capsules that touch things, or a body of smooth limbs"
+    )
     height: PositiveValue = Field(default=Range(range=(1.55, 1.9)), description="of the body [m]")
     x: FloatValue = Field(default=0.0, description="where it begins [m]; drawn for each avatar and episode")
     y: FloatValue = Field(

@@ -40,7 +40,10 @@ class Address:
             raise TaskError(f"a service has an address such as http://127.0.0.1:8470, got {shown(address)}")
         self.address = address.rstrip("/")
         self.host, self.port = parts.hostname, parts.port or (443 if parts.scheme == "https" else 80)
-        self.context = ssl.create_default_context(cafile=ca) if parts.scheme == "https" else None
+        try:
+            self.context = ssl.create_default_context(cafile=ca) if parts.scheme == "https" else None
+        except OSError as error:
+            raise TaskError(f"ca: {ca} is no PEM file of certificates that can be read: {error}") from None
         self.timeout = timeout
         given = token or os.environ.get(TOKEN_ENV) or kept_token(address)
         self._headers = {"Authorization": f"Bearer {given}"} if given else {}
@@ -63,6 +66,11 @@ class Address:
                 link.request(method, path, None if body is None else json.dumps(body), headers)
                 answer = link.getresponse()
                 status, content = answer.status, answer.read(LARGEST)
+            except ssl.SSLCertVerificationError as error:
+                raise ConnectionLost(
+                    f"the certificate of {self.address} is not trusted ({error.verify_message}); if it should be, give "
+                    f"`ca`, a PEM file of who signed it"
+                ) from None
             except (OSError, http.client.HTTPException) as error:
                 raise ConnectionLost(f"no service answers at {self.address}: {error or type(error).__name__}") from None
         if status >= 400:

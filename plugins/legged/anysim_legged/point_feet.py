@@ -19,7 +19,6 @@ from anysim.kinematics.pinocchio_model import pinocchio
 from anysim.math import pose as P
 from anysim_legged.legs import Legs, solve
 from anysim_legged.tracking import tick_of
-from anysim_legged.wholebody import about_z
 
 LIFT, SINK = 80.0, 16.0
 """[1/s^2], [1/s] How hard the standing leg holds the height of the centre of mass, and damps it."""
@@ -36,21 +35,36 @@ ARRIVED = 0.9
 
 
 class Body(NamedTuple):
-    """What is measured of an env, world frame."""
+    """What is measured of the envs at hand, world frame."""
 
     com: Array
+    """(n, 3)"""
     speed: Array
-    turn: Array
-    """(3, 3) of the base."""
+    """(n, 3)"""
     base: Array
-    """(3,) its place."""
+    """(n, 7) its pose."""
     twist: Array
-    """(6,)"""
+    """(n, 6)"""
     joints: Array
-    """(2, 3) of the legs, and their rates."""
-    rates: Array
+    """(n, 2, 3) of the legs."""
     feet: Array
-    """(2, 3)"""
+    """(n, 2, 3)"""
+    heading: Array
+    """(n, 2) cosine and sine of the direction in which the base looks."""
+
+    def into(self, way: Array) -> Array:
+        """Vectors (n, 2) over the ground, in the heading's axes."""
+        c, s = self.heading[:, 0], self.heading[:, 1]
+        return np.stack([c * way[:, 0] + s * way[:, 1], c * way[:, 1] - s * way[:, 0]], axis=1)
+
+    def out_of(self, way: Array) -> Array:
+        """The same back into the world's axes."""
+        c, s = self.heading[:, 0], self.heading[:, 1]
+        return np.stack([c * way[:, 0] - s * way[:, 1], s * way[:, 0] + c * way[:, 1]], axis=1)
+
+    def rows(self, picked: Array) -> "Body":
+        """Those of some rows."""
+        return Body(*(values[picked] for values in self))
 
 
 class PointFootWalk(Controller):
@@ -119,93 +133,97 @@ class PointFootWalk(Controller):
     def update(self, env_ids: Array | None) -> Command:
         envs = np.arange(self.num_envs) if env_ids is None else env_ids
         joints, rates = self.robot.joint_pos(env_ids), self.robot.joint_vel(env_ids)
-        bases, twists = self.robot.base_pose(env_ids), self.robot.base_twist(env_ids)
         columns = self.channel.joint_columns
         position, velocity = joints[:, columns].copy(), rates[:, columns].copy()
         effort = np.zeros_like(position)
-        for row, env in enumerate(envs):
-            body = self._body(joints[row], rates[row], bases[row], twists[row])
-            self._follow(int(env), body)
-            stance = int(self._stance[env])
-            effort[row, self._order[stance]] = self._carry(body, stance)
-            if self._time[env] >= 0.0:
-                swing = self._order[1 - stance]
-                position[row, swing], velocity[row, swing] = self._swing(int(env), body)
-                self._time[env] += self._tick
+        body = self._body(joints, rates, self.robot.base_pose(env_ids), self.robot.base_twist(env_ids))
+        self._follow(envs, body)
+        rows, stance = np.arange(len(envs)), self._stance[envs]
+        effort[rows[:, None], self._order[stance]] = self._carry(body, stance)
+        going = np.flatnonzero(self._time[envs] >= 0.0)
+        if len(going):
+            swing = self._order[1 - stance[going]]
+            place, rate = self._swing(envs[going], body.rows(going))
+            position[going[:, None], swing], velocity[going[:, None], swing] = place, rate
+            self._time[envs[going]] += self._tick
         return Command(position, velocity, None, effort)
 
     def _body(self, joints: Array, rates: Array, base: Array, twist: Array) -> Body:
-        model, columns = self.robot.kinematics, self.legs.columns
-        pinocchio().centerOfMass(model.model, model.data, model.q(joints, base), model.v(rates, base, twist), False)
-        turn = P.to_matrix(base[3:])
-        feet = base[:3] + self.legs.feet(joints[columns][None])[0] @ turn.T
-        com, speed = np.array(model.data.com[0]), np.array(model.data.vcom[0])
-        return Body(com, speed, turn, base[:3], twist, joints[columns], rates[columns], feet)
+        model, of_legs = self.robot.kinematics, joints[:, self.legs.columns]
+        com, speed = np.empty((len(joints), 3)), np.empty((len(joints), 3))
+        for row in range(len(joints)):
+            q, v = model.q(joints[row], base[row]), model.v(rates[row], base[row], twist[row])
+            pinocchio().centerOfMass(model.model, model.data, q, v, False)
+            com[row], speed[row] = model.data.com[0], model.data.vcom[0]
+        feet = base[:, None, :3] + P.rotate(_each(base, 2), self.legs.feet(of_legs))
+        yaw = P.yaw(base[:, 3:])
+        return Body(com, speed, base, twist, of_legs, feet, np.stack([np.cos(yaw), np.sin(yaw)], axis=1))
 
-    def _follow(self, env: int, body: Body) -> None:
+    def _follow(self, envs: Array, body: Body) -> None:
         """Which foot stands: begin the next step where this one has ended."""
-        stance = int(self._stance[env])
+        rows, stance, time = np.arange(len(envs)), self._stance[envs], self._time[envs]
         swing = 1 - stance
-        if self._time[env] < 0.0:  # this foot pushes the body over the other, on which it will come to stand
-            away = self._heading(body).T @ (self._capture_point(body) - body.feet[swing, :2])
-            ended = -self._sides[swing] * away[1] < 1.3 * self._width / (1.0 + self._grows)
-        else:
-            touched = body.feet[swing, 2] - body.feet[stance, 2] < 0.001
-            ended = self._time[env] >= (DOWN if touched else 1.0) * self._step
-        if ended:
-            self._stance[env], self._time[env], self._lifted[env] = swing, 0.0, body.feet[stance]
+        # before the first step this foot pushes the body over the other, on which it will come to stand
+        away = body.into(self._capture_point(body) - body.feet[rows, swing, :2])
+        over = -self._sides[swing] * away[:, 1] < 1.3 * self._width / (1.0 + self._grows)
+        touched = body.feet[rows, swing, 2] - body.feet[rows, stance, 2] < 0.001
+        ended = np.where(time < 0.0, over, time >= np.where(touched, DOWN, 1.0) * self._step)
+        now = envs[ended]
+        self._stance[now], self._time[now], self._lifted[now] = swing[ended], 0.0, body.feet[rows, stance][ended]
 
     def _capture_point(self, body: Body) -> Array:
-        return body.com[:2] + body.speed[:2] / self._omega
+        return body.com[:, :2] + body.speed[:, :2] / self._omega
 
-    def _heading(self, body: Body) -> Array:
-        return about_z(float(np.arctan2(body.turn[1, 0], body.turn[0, 0])))[:2, :2]
+    def _carry(self, body: Body, stance: Array) -> Array:
+        """Efforts (n, 3) of standing legs: a force on the ground that holds the height and turns the trunk upright."""
+        mass, rows = self.robot.kinematics.mass, np.arange(len(stance))
+        arm = body.feet[rows, stance] - body.com
+        weight, height = mass * self._gravity, -arm[:, 2]
+        load = weight + mass * (LIFT * (self._height - height) - SINK * body.speed[:, 2])
+        load = np.clip(load, 0.3 * weight, 2.0 * weight)
+        up = P.rotate(body.base[:, 3:], np.broadcast_to([0.0, 0.0, 1.0], (len(stance), 3)))
+        lean = np.stack([up[:, 1], -up[:, 0]], axis=1)
+        moment = weight * self._height * (UPRIGHT * lean - CALM * body.twist[:, 3:5])
+        flat = np.stack([-moment[:, 1] - arm[:, 0] * load, moment[:, 0] - arm[:, 1] * load], axis=1) / height[:, None]
+        flat *= np.minimum(1.0, GRIP * load / np.maximum(np.hypot(flat[:, 0], flat[:, 1]), 1e-9))[:, None]
+        jacobian = self.legs.jacobian(body.joints)[rows, stance]
+        force = P.rotate_inverse(body.base[:, 3:], np.concatenate([flat, load[:, None]], axis=1))
+        return -(jacobian * force[:, :, None]).sum(axis=1)
 
-    def _carry(self, body: Body, stance: int) -> Array:
-        """Efforts (3,) of the standing leg: a force on the ground that holds the height and turns the trunk upright."""
-        mass = self.robot.kinematics.mass
-        arm = body.feet[stance] - body.com
-        weight, height = mass * self._gravity, -float(arm[2])
-        load = weight + mass * (LIFT * (self._height - height) - SINK * float(body.speed[2]))
-        load = float(np.clip(load, 0.3 * weight, 2.0 * weight))
-        up = body.turn[:, 2]
-        moment = weight * self._height * (UPRIGHT * np.array([up[1], -up[0]]) - CALM * body.twist[3:5])
-        flat = np.array([-moment[1] - arm[0] * load, moment[0] - arm[1] * load]) / height
-        flat *= min(1.0, GRIP * load / max(float(np.hypot(*flat)), 1e-9))
-        jacobian = self.legs.jacobian(body.joints[None])[0, stance]
-        return -jacobian.T @ (body.turn.T @ np.append(flat, load))
+    def _landing(self, envs: Array, body: Body, stance: Array) -> Array:
+        """Where the swinging feet land (n, 2)."""
+        side = self._sides[1 - stance]
+        left = self._step - np.minimum(self._time[envs], self._step)
+        standing = body.feet[np.arange(len(envs)), stance, :2]
+        there = body.into(self._capture_point(body) - standing) * np.exp(self._omega * left)[:, None]
+        lag = self._wanted[envs] - body.into(body.speed)
+        self._slip[envs] = np.clip(self._slip[envs] + self._tick * self._tracking * lag, -self.high, self.high)
+        place = there - (self._wanted[envs] + self._slip[envs]) * self._step / (self._grows - 1.0)
+        place[:, 1] = side * np.clip(side * place[:, 1] + self._width / (1.0 + self._grows), NEAR, FAR)
+        place[:, 0] = np.clip(place[:, 0], -AHEAD, AHEAD)
+        return standing + body.out_of(place)
 
-    def _landing(self, env: int, body: Body) -> Array:
-        """Where the swinging foot lands (2,)."""
-        stance = int(self._stance[env])
-        side, turn = self._sides[1 - stance], self._heading(body)
-        left = self._step - min(float(self._time[env]), self._step)
-        there = turn.T @ (self._capture_point(body) - body.feet[stance, :2]) * np.exp(self._omega * left)
-        speed = turn.T @ body.speed[:2]
-        lag = self._wanted[env] - speed
-        self._slip[env] = np.clip(self._slip[env] + self._tick * self._tracking * lag, -self.high, self.high)
-        offset = (self._wanted[env] + self._slip[env]) * self._step / (self._grows - 1.0)
-        x, y = there - offset
-        y += side * self._width / (1.0 + self._grows)
-        place = np.array([np.clip(x, -AHEAD, AHEAD), side * np.clip(side * y, NEAR, FAR)])
-        return body.feet[stance, :2] + turn @ place
-
-    def _swing(self, env: int, body: Body) -> tuple[Array, Array]:
-        """Positions (3,) and rates (3,) of the swinging leg."""
-        stance = int(self._stance[env])
-        swing, start, part = 1 - stance, self._lifted[env], float(self._time[env]) / self._step
-        s = min(part / ARRIVED, 1.0)
+    def _swing(self, envs: Array, body: Body) -> tuple[Array, Array]:
+        """Positions (n, 3) and rates (n, 3) of the swinging legs."""
+        rows, stance = np.arange(len(envs)), self._stance[envs]
+        swing, start, part = 1 - stance, self._lifted[envs], self._time[envs] / self._step
+        s = np.minimum(part / ARRIVED, 1.0)
         share, slope = s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / (ARRIVED * self._step)
-        way = np.append(self._landing(env, body), body.feet[stance, 2]) - start
-        place, rate = start + share * way, slope * way
-        place[2] += self._clearance * (16.0 * (s * (1.0 - s)) ** 2 - 0.5 * max(part - ARRIVED, 0.0))
-        rate[2] += self._clearance * 32.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (ARRIVED * self._step)
-        feet, rates = (body.feet - body.base) @ body.turn, np.zeros((2, 3))
-        feet[swing] = body.turn.T @ (place - body.base)
-        rates[swing] = body.turn.T @ (rate - body.twist[:3] - np.cross(body.twist[3:], place - body.base))
-        posture = self.legs.inverse(feet[None])
-        joints = np.clip(posture.joints[0, swing], self.legs.lower[swing], self.legs.upper[swing])
-        return joints, np.clip(solve(posture.jacobian, rates[None])[0, swing], -20.0, 20.0)
+        way = np.column_stack([self._landing(envs, body, stance), body.feet[rows, stance, 2]]) - start
+        place, rate = start + share[:, None] * way, slope[:, None] * way
+        place[:, 2] += self._clearance * (16.0 * (s * (1.0 - s)) ** 2 - 0.5 * np.maximum(part - ARRIVED, 0.0))
+        rate[:, 2] += self._clearance * 32.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (ARRIVED * self._step)
+        turn, moved = body.base[:, 3:], place - body.base[:, :3]
+        feet, rates = (
+            P.rotate_inverse(_each(body.base, 2), body.feet - body.base[:, None, :3]),
+            np.zeros_like(body.feet),
+        )
+        feet[rows, swing] = P.rotate_inverse(turn, moved)
+        carried = body.twist[:, :3] + P.cross(body.twist[:, 3:], moved)
+        rates[rows, swing] = P.rotate_inverse(turn, rate - carried)
+        posture = self.legs.inverse(feet)
+        joints = np.clip(posture.joints[rows, swing], self.legs.lower[swing], self.legs.upper[swing])
+        return joints, np.clip(solve(posture.jacobian, rates)[rows, swing], -20.0, 20.0)
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         return {name: values[env_ids].copy() for name, values in self._arrays().items()}
@@ -222,3 +240,8 @@ class PointFootWalk(Controller):
             "stance": self._stance,
             "lifted": self._lifted,
         }
+
+
+def _each(pose: Array, count: int) -> Array:
+    """(n, count, 4) the turn of poses (n, 7) for several points of each."""
+    return np.broadcast_to(pose[:, None, 3:], (len(pose), count, 4))

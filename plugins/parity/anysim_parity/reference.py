@@ -65,7 +65,7 @@ class _Law:
         self._kp = np.array([a.kp for a in drives]) * position
         self._kd = np.array([a.kd for a in drives]) * position
         self._limit = np.array([a.effort_limit for a in drives])
-        self._damping = np.array([joint.damping for joint in joints])
+        self._damping, *self._spring = np.reshape([(j.damping, j.stiffness, j.spring_rest) for j in joints], (-1, 3)).T
 
     def all(self, q: Array) -> Array:
         """Positions of all joints (J,) from those of the leaders."""
@@ -96,9 +96,9 @@ class _Law:
         mass, bias = self._mechanism.equations(full, rate)
         wanted = self._kp * (target - full[self._joint]) - self._kd * rate[self._joint]
         free = np.abs(wanted) < self._limit  # a drive at its limit neither stiffens nor damps
-        stiff, damp = np.zeros(len(full)), self._damping.copy()
+        stiff, damp = self._spring[0].copy(), self._damping.copy()
         np.add.at(stiff, self._joint, self._kp * free)
         np.add.at(damp, self._joint, self._kd * free)
-        effort = -bias - self._damping * rate
+        effort = -bias - self._damping * rate - self._spring[0] * (full - self._spring[1])
         np.add.at(effort, self._joint, np.clip(wanted, -self._limit, self._limit))
         return c.T @ mass @ c, c.T @ effort, (c.T * stiff) @ c, (c.T * damp) @ c

@@ -14,7 +14,7 @@ from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
 from anysim.model.hash import split
-from anysim.model.world import Box, Cylinder, Geom, Mesh, MeshShape, Quat, Shape, Sphere, Vec3
+from anysim.model.world import Box, Capsule, Cylinder, Geom, Mesh, MeshShape, Quat, Shape, Sphere, Vec3
 from anysim_schemas.limits import ASSET_BYTES
 from anysim_urdf import xml as urdf_xml
 from anysim_urdf.xml import LinkElement, UrdfFile
@@ -99,6 +99,8 @@ class GeometryReader:
         size = [value * self._scale for value in shape.size]
         if shape.kind == "box":
             return Box((size[0] / 2, size[1] / 2, size[2] / 2))
+        if shape.kind == "capsule":  # its length is that of the cylinder between the caps
+            return Capsule(size[0], size[1] / 2)
         return Sphere(size[0]) if shape.kind == "sphere" else Cylinder(size[0], size[1] / 2)
 
     def _path(self, link: str, mesh: urdf_xml.Shape) -> Path:

@@ -261,6 +261,8 @@ class _UrdfImport:
             effort_limit=_bound(joint.effort),
             damping=self._positive(joint, "damping"),
             friction=self._positive(joint, "friction"),
+            stiffness=self._positive(joint, "stiffness"),
+            spring_rest=joint.spring_rest * (self.scale if joint.type == "prismatic" else 1.0),
             initial=min(max(0.0, lower), upper),
         )
 

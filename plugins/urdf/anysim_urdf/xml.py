@@ -20,11 +20,11 @@ from anysim.math import pose as P
 from anysim_urdf.unheld import notes_of
 
 Rgba = tuple[float, float, float, float]
-_GEOMETRY = {"box": ("size", 3), "sphere": ("radius", 1), "cylinder": ("radius", 1), "mesh": ("filename", 0)}
+_GEOMETRY = ("box", "sphere", "cylinder", "capsule", "mesh")
 
 
 class Shape(NamedTuple):
-    """`kind` is box (size: edge lengths), sphere (radius), cylinder (radius, length) or mesh (size: scale)."""
+    """`kind` is box (size: edge lengths), sphere (radius), cylinder, capsule (radius, length) or mesh (size: scale)."""
 
     kind: str
     size: tuple[float, ...]
@@ -74,6 +74,8 @@ class JointElement(NamedTuple):
     damping: float
     friction: float
     mimic: MimicElement | None
+    stiffness: float = 0.0  # of a spring, and where it rests
+    spring_rest: float = 0.0
 
 
 class UrdfFile:
@@ -94,6 +96,11 @@ class UrdfFile:
                 self._materials.setdefault(material.get("name"), self._rgba(color))
         self.unheld = notes_of(root)
         self.instead = _instead([str(element.tag) for element in root])
+        self._springs = {
+            element.get("reference"): tuple(self._text(element, tag) for tag in ("springStiffness", "springReference"))
+            for element in root.findall("gazebo")
+            if element.find("springStiffness") is not None
+        }
         self.links = {element.get("name"): self._link(element) for element in root.findall("link")}
         self.joints = [self._joint(element) for element in root.findall("joint")]
 
@@ -155,7 +162,7 @@ class UrdfFile:
             size = self._numbers(shape, "scale", (1, 3), (1.0, 1.0, 1.0))
             size = size * 3 if len(size) == 1 else size
         else:
-            keys = ("radius", "length") if shape.tag == "cylinder" else ("radius",)
+            keys = ("radius", "length") if shape.tag in ("cylinder", "capsule") else ("radius",)
             size = tuple(self._number(shape, key, None) for key in keys)
         if 0.0 in size or (min(size) < 0 and shape.tag != "mesh"):  # a negative scale of a mesh mirrors
             raise self._error(shape, f"<{shape.tag}> of {self._owner(element)} has the size {list(size)}")
@@ -204,6 +211,7 @@ class UrdfFile:
             0.0 if dynamics is None else self._number(dynamics, "damping", 0.0),
             0.0 if dynamics is None else self._number(dynamics, "friction", 0.0),
             follows,
+            *self._springs.get(element.get("name"), (0.0, 0.0)),
         )
 
     def _origin(self, element: Any) -> Array:
@@ -234,6 +242,17 @@ class UrdfFile:
             wanted = " or ".join(map(str, counts)) + (" finite number" if counts == (1,) else " finite numbers")
             raise self._error(element, f'<{element.tag} {key}="{text}"> of {self._owner(element)}: expected {wanted}')
         return values
+
+    def _text(self, element: Any, tag: str) -> float:
+        """The number in a child of an element; 0 without the child."""
+        text = element.findtext(tag)
+        try:
+            value = 0.0 if text is None else float(text)
+        except ValueError:
+            value = float("nan")
+        if not isfinite(value):
+            raise self._error(element, f"<{tag}> holds '{text}': expected a finite number")
+        return value
 
     def _owner(self, element: Any) -> str:
         """The link or joint that an element belongs to."""

@@ -198,6 +198,7 @@ def _resident_mb() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="needs glibc, to tell a leak from its caches")
 def test_fifty_engines_leave_no_memory_behind(worlds):
     """Built, stepped, drawn, destroyed."""

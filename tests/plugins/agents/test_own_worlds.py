@@ -174,10 +174,11 @@ def test_a_skill_takes_no_file_from_an_agent() -> None:
     [
         ({"world": {"objects": {"a": {"source": {"box": [0.1, 0.1, 0.1]}, "count": 4000}}}}, "at most 200"),
         ({"world": {"cameras": {"a": {"from": [1, 1, 1], "look_at": [0, 0, 0], "size": [4096, 4096]}}}}, "pixels"),
+        ({"world": {"families": {f"p{i}": {"kind": "avatar"} for i in range(9)}}}, "at most 8"),
         ({"physics": {"dt": 0.00001}}, "physics steps in a control step"),
         ({"task": {"horizon": 10**8, "observations": {"policy": ["last_action"]}}}, "at most 100000"),
     ],
-    ids=["things", "pixels", "substeps", "horizon"],
+    ids=["things", "pixels", "families", "substeps", "horizon"],
 )
 def test_a_world_beyond_the_limits_is_refused(change: dict[str, Any], words: str) -> None:
     assert any(words in one for one in refusals(yaml.safe_dump(change)))

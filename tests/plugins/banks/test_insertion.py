@@ -70,7 +70,9 @@ def test_a_plug_fits_in_both_ways_round_and_what_stands_beside_its_hole_is_in_th
     assert method.subject.clearance == 0.0005
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    "engine", [name if name == "mujoco" else pytest.param(name, marks=pytest.mark.slow) for name in ENGINES]
+)
 def test_a_peg_comes_to_its_end_unless_it_is_askew_or_lands_on_the_rim(engine: str) -> None:
     """Misplaced by up to the clearance it goes in, by more it stands on the rim."""
     method = of()

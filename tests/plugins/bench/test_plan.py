@@ -10,6 +10,7 @@ from anysim_bench.plan_costs import PlanCost
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_paths_are_free_and_services_answer_as_their_planner_does():
     require_engine("mujoco")
     cost = plan_cost("rrt", "pick_cube", requests=4, goals=2, engine="mujoco", pairs=3)

@@ -50,6 +50,7 @@ def test_too_few_resets_are_refused():
         reset_cost("null", 5)
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_verdict():
     assert "null" in runnable(Capability.VARYING_ENTITIES)
     done = CliRunner().invoke(app, ["resets", "--engine", "null", "--resets", "40", "-n", "2"])

@@ -11,7 +11,10 @@ from tests.plugins.export.runs import record
 from tests.small_disk import small_disk
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("export")]
-FORMS = ("coco", pytest.param("foxglove", marks=pytest.mark.full), "lerobot", "rlds-ready", "robomimic", "webdataset")
+FORMS = (
+    *(pytest.param(form, marks=pytest.mark.full) for form in ("coco", "foxglove")),
+    *("lerobot", "rlds-ready", "robomimic", "webdataset"),
+)
 OPTIONS = {"coco": {"every": 5}, "lerobot": {"channels": True}, "rlds-ready": {"states": True}}
 
 PRELUDE = """

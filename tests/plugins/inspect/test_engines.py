@@ -102,6 +102,7 @@ def test_a_crash_while_drawing_leaves_the_physics_that_was_found(install: Instal
     assert "ended with exit code 3" in found["odd: rendering"][1]
 
 
+@pytest.mark.slow
 def test_an_engine_that_hangs_is_given_up(install: Install) -> None:
     install("    def _build(self, world, num_envs):\n        time.sleep(600)\n")
     state, found, _ = by_name(examine("odd", timeout=6.0))["odd: physics"]

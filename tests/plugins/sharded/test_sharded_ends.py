@@ -43,6 +43,7 @@ STEP_FOR_EVER = """
 WAIT = """
     sys.stdin.read()
 """
+WAYS = [pytest.param(STEP_FOR_EVER, id="stepping"), pytest.param(WAIT, id="waiting", marks=pytest.mark.slow)]
 
 
 def _start(tmp_path, more, **options):
@@ -86,7 +87,9 @@ def shared_memory():
     assert segments() <= before
 
 
-@pytest.mark.parametrize("ending", ["", "env.close()", "raise SystemExit(0)"])
+@pytest.mark.parametrize(
+    "ending", ["", *(pytest.param(words, marks=pytest.mark.slow) for words in ("env.close()", "raise SystemExit(0)"))]
+)
 def test_a_plain_script(tmp_path, shared_memory, ending):
     """Without a guard for the main module, and without closing: it runs once, says nothing, and leaves nothing."""
     process = _start(tmp_path, ending)
@@ -110,7 +113,7 @@ def test_a_killed_parent(tmp_path, shared_memory):
     assert gone(pids)
 
 
-@pytest.mark.parametrize("more", [STEP_FOR_EVER, WAIT], ids=["stepping", "waiting"])
+@pytest.mark.parametrize("more", WAYS)
 def test_a_parent_that_is_asked_to_end(tmp_path, shared_memory, more):
     """SIGTERM, which ends a Python program at once."""
     process = _start(tmp_path, more)
@@ -121,7 +124,7 @@ def test_a_parent_that_is_asked_to_end(tmp_path, shared_memory, more):
     assert gone(pids)
 
 
-@pytest.mark.parametrize("more", [STEP_FOR_EVER, WAIT], ids=["stepping", "waiting"])
+@pytest.mark.parametrize("more", WAYS)
 def test_ctrl_c(tmp_path, shared_memory, more):
     """SIGINT to the whole group, as a terminal sends it: one traceback, that of the program, and nothing is left."""
     process = _start(tmp_path, more, start_new_session=True)

@@ -55,8 +55,8 @@ def _lose(engine, blow, says):
             signal.SIGKILL,
             r"worker 1 of null \(envs 3 to 4\) was ended by signal 9 \(SIGKILL\); a new worker.*until reset",
         ),
-        (signal.SIGTERM, r"signal 15 \(SIGTERM\)"),
-        (signal.SIGSTOP, r"did not answer within 1\.5 s and was killed"),
+        pytest.param(signal.SIGTERM, r"signal 15 \(SIGTERM\)", marks=pytest.mark.slow),
+        pytest.param(signal.SIGSTOP, r"did not answer within 1\.5 s and was killed", marks=pytest.mark.slow),
     ],
 )
 def test_a_lost_worker_faults_its_own_envs(blow, says):
@@ -116,6 +116,7 @@ def test_a_worker_that_hangs_in_a_step(moody):
         engine.step()
 
 
+@pytest.mark.slow
 def test_a_long_step_has_more_time(moody):
     """The limit is for a control step: many of them in one call may take as many times as long."""
     engine = sharded(moody.Moody, 1, 0.5)().create_world(worlds.scene(), 1)
@@ -185,7 +186,7 @@ def test_a_read_survives_a_lost_worker():
         assert_same(read(engine, [0, 1, 2]), read(alone, [0, 1, 2]), "the others")
 
 
-@pytest.mark.parametrize("worker", [0, 1])
+@pytest.mark.parametrize("worker", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_parameters_are_those_of_their_envs_after_a_loss(worker):
     """Whichever worker is lost when they are asked for: a lost first one does not put its envs last."""
     alone, engine = _pair()

@@ -12,9 +12,10 @@ from anysim.testing.varying import having, random_presence, varied
 from anysim_sharded.engine import WorkerWarning, sharded
 
 WITHOUT_FAULTS = [field for field in FIELDS if field != "fault"]
+OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in ("pybullet", "sapien")]
 
 
-@pytest.mark.parametrize("name", ["null", "mujoco", "pybullet", "sapien"])
+@pytest.mark.parametrize("name", ["null", "mujoco", *OTHERS])
 def test_a_lost_worker_comes_back_with_what_was_present(name):
     """Its envs are as after a reset with their own entities and parameters; the others never notice."""
     engine_class = require_engine(name)
@@ -41,7 +42,7 @@ def test_a_lost_worker_comes_back_with_what_was_present(name):
         assert np.array_equal(everything, alone.get_parameters("body.mass"))
 
 
-@pytest.mark.parametrize("name", ["null", "pybullet"])
+@pytest.mark.parametrize("name", ["null", *OTHERS[:1]])
 def test_a_worker_that_is_lost_in_a_reset_takes_over_what_is_to_be_present(name):
     """A worker dies, and the next call is a reset with other entities: the new worker has them."""
     engine_class = require_engine(name)

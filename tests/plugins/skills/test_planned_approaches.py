@@ -34,7 +34,9 @@ def ended(skill: str, planner: str, engine: str) -> list[tuple[Outcome, int]]:
         return [(OUTCOMES[policy.skill.outcome[i]], int(policy.skill.attempts[i])) for i in everyone]
 
 
-@pytest.mark.parametrize("skill", SKILLS)
+@pytest.mark.parametrize(
+    "skill", [skill if skill == "reach" else pytest.param(skill, marks=pytest.mark.slow) for skill in SKILLS]
+)
 def test_what_is_behind_a_wall_is_reached_with_a_planner_and_held_up_without(skill: str) -> None:
     assert [outcome for outcome, _ in ended(skill, "rrt", "mujoco")] == [Outcome.OK] * 2
     assert (Outcome.OK, 1) not in ended(skill, "", "mujoco")

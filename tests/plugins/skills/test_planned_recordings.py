@@ -55,7 +55,9 @@ def test_recordings_depend_neither_on_workers_nor_on_other_envs(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+@pytest.mark.parametrize(
+    "engine", ["mujoco", *(pytest.param(name, marks=pytest.mark.full) for name in ("pybullet", "sapien"))]
+)
 def test_runs_from_the_command_line_are_the_same(engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     require_engine(engine)
     app, runs = typer.Typer(), list[list[dict[str, Any]]]()

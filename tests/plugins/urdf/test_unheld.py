@@ -10,56 +10,16 @@ from typer.testing import CliRunner
 
 from anysim import load
 from anysim.api import compile_world
-from anysim.assets.model import ImportedModel
+from anysim.assets.model import Fate, ImportedModel
 from anysim.compile.edit import without_entity
+from anysim.errors import AssetError
 from anysim.record.collector import run_header
-from anysim_urdf.unheld import READ
+from anysim_urdf import coverage
+from anysim_urdf.coverage import ROWS
 
 Load = Callable[..., ImportedModel]
 
 GAZEBO = '<gazebo reference="b"><mu1>0.2</mu1></gazebo>'
-SCHEMA = {  # elements of the URDF of ROS, of URDF 1.2 and of PyBullet, with their attributes
-    "robot": "name version xmlns:xacro",
-    "robot/material": "name",
-    "robot/material/color": "rgba",
-    "robot/material/texture": "filename",
-    "robot/gazebo": "reference",
-    "robot/transmission": "name type",
-    "robot/link": "name type",
-    "robot/link/inertial": "",
-    "robot/link/inertial/origin": "xyz rpy quat_xyzw",
-    "robot/link/inertial/mass": "value",
-    "robot/link/inertial/inertia": "ixx iyy izz ixy ixz iyz",
-    "robot/link/visual": "name",
-    "robot/link/visual/origin": "xyz rpy quat_xyzw",
-    "robot/link/visual/geometry": "",
-    "robot/link/visual/geometry/box": "size",
-    "robot/link/visual/geometry/cylinder": "radius length",
-    "robot/link/visual/geometry/sphere": "radius",
-    "robot/link/visual/geometry/mesh": "filename scale",
-    "robot/link/visual/material": "name",
-    "robot/link/visual/material/color": "rgba",
-    "robot/link/visual/material/texture": "filename",
-    "robot/link/collision": "name group concave",
-    "robot/link/collision/origin": "xyz rpy quat_xyzw",
-    "robot/link/collision/geometry": "",
-    "robot/link/collision/geometry/mesh": "filename scale",
-    "robot/link/collision/verbose": "value",
-    "robot/link/collision_checking": "",
-    "robot/link/contact": "",
-    "robot/link/contact/lateral_friction": "value",
-    "robot/joint": "name type",
-    "robot/joint/origin": "xyz rpy quat_xyzw",
-    "robot/joint/parent": "link",
-    "robot/joint/child": "link",
-    "robot/joint/axis": "xyz",
-    "robot/joint/calibration": "rising falling reference_position",
-    "robot/joint/limit": "lower upper effort velocity acceleration deceleration jerk",
-    "robot/joint/dynamics": "damping friction",
-    "robot/joint/mimic": "joint multiplier offset",
-    "robot/joint/safety_controller": "soft_lower_limit soft_upper_limit k_position k_velocity",
-    "robot/sensor": "name type update_rate",
-}
 
 
 def words(model: ImportedModel) -> list[str]:
@@ -86,6 +46,23 @@ def test_a_plain_file_has_no_notes(pair: Load) -> None:
     assert words(pair(shape.format("visual") + shape.format("collision") * 2, '<dynamics damping="1"/>', robot)) == []
 
 
+def test_springs_of_gazebo_are_the_joint_s(pair: Load) -> None:
+    spring = "<springStiffness>5</springStiffness><springReference>0.2</springReference>"
+    model = pair(robot=f'<gazebo reference="j">{spring}</gazebo>')
+    assert (model.joints[0].stiffness, model.joints[0].spring_rest) == (5.0, 0.2)
+    assert words(model) == []
+    other = pair(robot=f'<gazebo reference="b">{spring}</gazebo><gazebo reference="j">{spring}<mu1>1</mu1></gazebo>')
+    assert other.joints[0].stiffness == 5.0
+    (note,) = words(other)
+    assert note.startswith("<gazebo>: is left out: what it says of friction")
+    assert "(2: robot)" in note
+
+
+def test_a_spring_that_is_no_number_is_refused(pair: Load) -> None:
+    with pytest.raises(AssetError, match="<springStiffness> holds 'stiff': expected a finite number"):
+        pair(robot='<gazebo reference="j"><springStiffness>stiff</springStiffness></gazebo>')
+
+
 @pytest.mark.parametrize(
     ("part", "text", "note"),
     [
@@ -99,7 +76,7 @@ def test_a_plain_file_has_no_notes(pair: Load) -> None:
         ("robot", '<material name="m"><texture filename="a.png"/></material>', "<texture>: is left out: surfaces have"),
         ("joint", '<safety_controller k_velocity="1"/>', "<safety_controller>: is left out: limits are those of"),
         ("joint", '<calibration rising="0"/>', "<calibration>: is left out: it is of the real robot's encoders (1: jo"),
-        ("limit", 'jerk="3"', "<limit jerk>: is left out (1: joint 'j')"),
+        ("limit", 'jerk="3"', "<limit jerk>: is left out: a planner's limits are its own (1: joint 'j')"),
         ("link", '<inertial><mass value="9"/></inertial>', "<inertial>: of several in one <link> the first is read (1"),
         ("joint", '<axis xyz="1 0 0"/><axis xyz="0 1 0"/>', "<axis>: of several in one <joint> the first is read"),
     ],
@@ -109,25 +86,87 @@ def test_what_is_left_out_is_named(pair: Load, part: str, text: str, note: str) 
     assert any(one.startswith(note) for one in found), found
 
 
-@pytest.mark.parametrize("path", [path for path in SCHEMA if path != "robot"])
-def test_every_element_of_the_format_is_read_or_noted(path: str, urdf: Load) -> None:
-    """Each with all its attributes, where it may stand."""
-    inner = ""
-    for depth, tag in enumerate(reversed(path.split("/")[1:])):
-        attributes = "" if depth else "".join(f' {key}="0.5"' for key in SCHEMA[path].split() if key != "name")
-        inner = f'<{tag} name="x"{attributes}>{inner}</{tag}>'
+@pytest.mark.parametrize("row", [row for row in ROWS if row.fate is Fate.LEFT_OUT])
+def test_what_the_table_leaves_out_is_noted(row: coverage.Row) -> None:
+    """Each element where it may stand, with its attributes."""
     from lxml import etree
 
     from anysim_urdf.unheld import notes_of
 
-    found = [note.where for note in notes_of(etree.fromstring(f"<robot>{inner}</robot>"))]
-    parents = ["/".join(path.split("/")[:n]) for n in range(2, path.count("/") + 2)]
-    if missing := next((parent for parent in parents if parent not in READ), ""):
-        assert f"<{missing.rpartition('/')[2]}>" in found
-        return
-    tag = path.rpartition("/")[2]
-    wanted = {f"<{tag} {key}>" for key in set(SCHEMA[path].split()) - READ[path] - {"name"}}
-    assert wanted <= set(found)
+    inner = ""
+    for depth, tag in enumerate(reversed(row.path.split("/")[1:])):
+        given = "" if depth else "".join(f' {key}="0.5"' for key in row.attributes.split())
+        inner = f"<{tag}{given}>{inner}</{tag}>"
+    found = {note.where: note.message for note in notes_of(etree.fromstring(f"<robot>{inner}</robot>"))}
+    tag = row.path.rpartition("/")[2]
+    for where in [f"<{tag} {key}>" for key in row.attributes.split()] or [f"<{tag}>"]:
+        assert row.text in found[where]
+
+
+WHOLE = """<robot name="r"><material name="red"><color rgba="1 0 0 1"/></material>
+<link name="a"><inertial><origin xyz="0 0 0.1" rpy="0.1 0 0"/><mass value="1"/>
+  <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0.01" ixz="0.01" iyz="0.01"/></inertial>
+  <visual name="v"><origin xyz="1 0 0" rpy="0 0.1 0"/><geometry><box size="1 1 1"/></geometry>
+    <material name="red"/></visual>
+  <visual><geometry><cylinder radius="1" length="2"/></geometry>
+    <material name="own"><color rgba="0 1 0 1"/></material></visual>
+  <visual><geometry><sphere radius="1"/></geometry></visual>
+  <visual><geometry><capsule radius="1" length="2"/></geometry></visual>
+  <visual><geometry><mesh filename="thing.obj" scale="1 1 1"/></geometry></visual>
+  <collision name="c"><origin xyz="1 0 0" rpy="0 0.1 0"/><geometry><box size="1 1 1"/></geometry></collision>
+  <collision><geometry><cylinder radius="1" length="2"/></geometry></collision>
+  <collision><geometry><sphere radius="1"/></geometry></collision>
+  <collision><geometry><capsule radius="1" length="2"/></geometry></collision>
+  <collision><geometry><mesh filename="thing.obj" scale="1 1 1"/></geometry></collision></link>
+<link name="b"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial></link>
+<link name="c"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial></link>
+<joint name="j" type="revolute"><origin xyz="0 0 1" rpy="0.1 0 0"/><parent link="a"/><child link="b"/>
+  <axis xyz="0 0 1"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/><dynamics damping="1" friction="1"/></joint>
+<joint name="k" type="revolute"><parent link="a"/><child link="c"/><limit lower="-4" upper="4" effort="1" velocity="1"/>
+  <mimic joint="j" multiplier="2" offset="0.5"/></joint></robot>"""
+"""A robot with every element and attribute that the table does not leave out."""
+OTHERWISE = {
+    key.strip(): value.strip()
+    for pair in """
+xyz: 0 1 0; rpy: 0.2 0.1 0; size: 2 2 2; scale: 2 2 2; rgba: 0 0 1 1; type: prismatic; link: c;
+filename: other.obj; joint: k; name: own""".split(";")
+    for key, value in [pair.split(":")]
+}
+READ = [
+    (row.path, key) for row in ROWS for key in row.attributes.split() if row.fate in (Fate.EXACT, Fate.APPROXIMATED)
+]
+
+
+@pytest.mark.parametrize(("path", "key"), READ)
+def test_what_the_table_reads_is_in_the_model(path: str, key: str, tmp_path: Path) -> None:
+    """Another value is another model, or an error that says why not: nothing that is read has no effect."""
+    from lxml import etree
+
+    from anysim_urdf.load import import_urdf
+
+    corners = ("0 0 0", "1 0 0", "0 1 0", "0 0 1")
+    for name, size in (("thing.obj", 1), ("other.obj", 3)):
+        lines = [*(f"v {c.replace('1', str(size))}" for c in corners), "f 1 3 2", "f 1 2 4", "f 2 3 4", "f 1 4 3"]
+        (tmp_path / name).write_text("\n".join(lines))
+
+    def read(root: etree._Element) -> str:
+        (tmp_path / "r.urdf").write_bytes(etree.tostring(root))
+        try:
+            model = import_urdf(tmp_path / "r.urdf", root=tmp_path)
+        except AssetError as error:
+            return str(error)
+        meshes = [(mesh.name, mesh.hash) for mesh in model.meshes]
+        parts = (model.bodies, model.joints, model.geoms, model.sites, dict(model.links))
+        return repr((*parts, meshes, model.actuator_hints, model.report))
+
+    root = etree.fromstring(WHOLE)
+    before = read(root)
+    found = [node for node in root.iterfind(path.removeprefix("robot/")) if node.get(key) is not None]
+    assert found, f"the robot of this test has no {path} with {key}"
+    old = found[0].get(key) or ""
+    found[0].set(key, OTHERWISE[key] if key in OTHERWISE else str(float(old) * 0.7))
+    assert read(root) != before
 
 
 def test_they_are_told_by_check_and_kept_with_what_is_recorded(

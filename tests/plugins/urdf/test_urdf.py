@@ -277,7 +277,7 @@ def test_a_visual_that_cannot_be_read_is_dropped_and_reported(urdf: Load, inerti
 
 A, B, C = link("a"), link("b"), link("c")
 BALL = '<collision><geometry><sphere radius="{}"/></geometry></collision>'
-CAPSULE = '<collision><geometry><capsule radius="1"/></geometry></collision>'
+PLANE = '<collision><geometry><plane normal="0 0 1"/></geometry></collision>'
 MESH = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
 PART = '<inertial><mass value="1"/><inertia ixx="1"/></inertial>'
 REFUSED = {
@@ -295,7 +295,7 @@ REFUSED = {
     "no mass": (A + B + joint("j", "a", "b"), "no link that moves has a mass"),
     "xacro": (link("a", MESH.format("$(optenv X a)/b.stl")), "arm.urdf:3: <mesh"),
     "xacro brace": (link("${prefix}a"), "run xacro on the source first"),
-    "capsule": (link("a", CAPSULE), "link 'a' has a <capsule>; a URDF knows box, sphere, cylinder, mesh"),
+    "plane": (link("a", PLANE), "link 'a' has a <plane>; a URDF knows box, sphere, cylinder, capsule, mesh"),
     "no size": (link("a", "<collision><geometry><box/></geometry></collision>"), "<box> of link 'a' lacks size"),
     "partial inertia": (link("a", PART), "<inertia> of link 'a' lacks iyy"),
     "negative size": (link("a", BALL.format(-1)), "<sphere> of link 'a' has the size [-1.0]"),

@@ -1,5 +1,6 @@
 """An MJCF file as a compiled MuJoCo model, after looking where its references lead."""
 
+import warnings
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -47,7 +48,12 @@ def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | N
             said += left_out
         if notes is not None:
             notes += [*said, *unheld.late(spec)]
-        return spec.compile()
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            model = spec.compile()
+        if notes is not None:
+            notes += [ImportNote("info", "MuJoCo", f"warns: {' '.join(str(one.message).split())}") for one in warned]
+        return model
     except (ValueError, mujoco.FatalError) as error:
         raise AssetError(f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error
 

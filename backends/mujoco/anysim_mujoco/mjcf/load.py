@@ -8,8 +8,8 @@ Rules where the neutral model is narrower; each use is a note in the report:
   and the body still collides with neither its parent nor what it did not collide with.
 - Sites and bodies share their names here: a site that is called like a body is found as `<body>.<site>`.
 - Joint positions keep the file's zero, whatever its `ref`. A keyframe `home` gives the initial ones.
-- Joint equalities become mimics (the linear term). Tendons, joint springs and drives that are no position, velocity or
-  motor drive of one joint are dropped. Ball joints, connect and weld equalities and flexes are refused.
+- Joint equalities become mimics (the linear term). Tendons and drives that are no position, velocity or motor drive of
+  one joint are dropped. Ball joints, connect and weld equalities and flexes are refused.
 """
 
 from collections.abc import Collection
@@ -36,7 +36,7 @@ from anysim_mujoco.mjcf.drives import drive_hint, left_out, shared
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
 from anysim_mujoco.mjcf.pairs import PairReader
-from anysim_mujoco.mjcf.unheld import mixed
+from anysim_mujoco.mjcf.unheld import mixed, of_tendons
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
@@ -116,8 +116,7 @@ class _MjcfImport:
                 )
         if model.nflex:
             raise AssetError(f"{self.path}: holds {model.nflex} flexes; the neutral model has rigid bodies")
-        if model.ntendon:
-            self._note("dropped", "tendons", f"{model.ntendon} of them are left out, with what they drive and couple")
+        self.notes += of_tendons(model)
 
     def _top(self) -> int:
         model = self.model
@@ -246,8 +245,6 @@ class _MjcfImport:
         model, unit = self.model, self._unit(j)
         dof, name = int(model.jnt_dofadr[j]), self._joint_name(j)
         lower, upper = (float(v) * unit for v in model.jnt_range[j]) if model.jnt_limited[j] else (-inf, inf)
-        if model.jnt_stiffness[j]:
-            self._note("dropped", name, f"has a spring of {model.jnt_stiffness[j]:g}, which is left out")
         home = [k for k in range(model.nkey) if model.key(k).name == "home"]
         start = model.key_qpos[home[0]] if home else model.qpos0
         initial = float(start[model.jnt_qposadr[j]]) * unit
@@ -268,6 +265,8 @@ class _MjcfImport:
             armature=float(model.dof_armature[dof]),
             initial=min(max(initial, lower), upper),
             limit_softness=softness if softness > 0 and abs(softness - 0.02) > 1e-9 else 0.0,
+            stiffness=float(model.jnt_stiffness[j]),
+            spring_rest=float(model.qpos_spring[model.jnt_qposadr[j]]) * unit if model.jnt_stiffness[j] else 0.0,
         )
 
     def _mimics(self) -> None:

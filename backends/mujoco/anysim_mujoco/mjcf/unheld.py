@@ -1,55 +1,19 @@
 """Notes of what an MJCF file says and the neutral model does not hold.
 
-The tables name every field of MuJoCo's elements that the importer reads, and those that cannot matter here. Any other
-that is not at its default becomes a note, so that none is dropped in silence, whatever a later MuJoCo adds.
+`anysim_mujoco.mjcf.coverage` has the fate of every field of MuJoCo's elements. One that is left out, or that the table
+does not know, becomes a note where it is not at its default, so that none is dropped in silence, whatever a later
+MuJoCo adds; one that is approximated where that matters.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import mujoco
+import numpy as np
 
-from anysim.assets.model import ImportNote
+from anysim.assets.model import Fate, ImportNote
 from anysim.errors import listing
-
-BOOKKEEPING = frozenset(
-    "id info signature compiler name classname parent frame childclass group element authored "
-    "bodies cameras frames geoms joints lights sites".split()
-)
-"""What every element has for MuJoCo's own use; `group` is a switch of its viewer."""
-
-_POSE = "pos quat alt"
-READ: Mapping[str, frozenset[str]] = {
-    kind: frozenset(fields.split())
-    for kind, fields in {
-        "body": f"{_POSE} mass ipos iquat ialt inertia fullinertia explicitinertial gravcomp",
-        "joint": "type pos axis range limited armature frictionloss ref actfrclimited springdamper springref",
-        "geom": f"{_POSE} type fromto size priority friction mass density typeinertia material rgba hfieldname "
-        "meshname fitscale",
-        "site": f"{_POSE} fromto",
-        "mesh": "file content_type inertia maxhullvert needsdf octree_maxdepth refpos refquat scale smoothnormal "
-        "userface userfacenormal userfacetexcoord usernode usernormal usertet usertexcoord uservert material",
-        "hfield": "file content_type ncol nrow size userdata",
-        "material": "rgba",
-        "equality": "name1 name2 objtype type data",
-        "actuator": "actdim actlimited actrange biasprm biastype ctrllimited dynprm dyntype forcelimited gainprm "
-        "gaintype gear target trntype type velrange ctrlspec",
-        "key": "name",
-    }.items()
-}
-"""The fields that are read, or of which a note is made elsewhere."""
-HARMLESS: Mapping[str, frozenset[str]] = {
-    kind: frozenset(fields.split())
-    for kind, fields in {
-        "body": "simple fuse sleep",
-        "joint": "align",
-        "site": "type size rgba material meshname",
-        "material": "texrepeat texuniform textures",
-        "actuator": "lengthrange inheritrange cranklength refsite slidersite",
-        "key": "time",
-    }.items()
-}
-"""The fields that cannot matter: of how MuJoCo computes, or of what is noted as a whole or left out anyway."""
+from anysim_mujoco.mjcf.coverage import BOOKKEEPING, FIELDS, fate, whole
 
 PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
     ("geom", "solref"): lambda geom: _solref(geom.solref),
@@ -70,40 +34,10 @@ PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
     ("equality", "active"): lambda tie: "" if tie.active else "is inactive, and left out",
     ("key", "qpos"): lambda key: "" if key.name == "home" else "are not kept: only the keyframe 'home' is",
 }
-"""The fields that are read in part, with what is not; empty where all is."""
+"""Of fields that are approximated, what is not read of an element; empty where all is. Others are noted elsewhere."""
 
-LEFT_OUT = {
-    "texture": "are left out: surfaces have plain colours",
-    "skin": "are left out: bodies are drawn by their geoms",
-    "camera": "are left out: those of a world are its own",
-    "light": "are left out: those of a world are its own",
-    "pair": "are left out: geoms meet by their masks, with the friction of both",
-    "sensor": "are left out: those of a world are its own",
-    "numeric": "are left out: MuJoCo itself makes nothing of them",
-    "text": "are left out: MuJoCo itself makes nothing of them",
-    "tuple": "are left out: MuJoCo itself makes nothing of them",
-    "plugin": "are left out: they are MuJoCo's alone",
-}
-"""The elements that are left out whole; tendons and flexes have words of their own."""
-
-EFFECTS: Mapping[str, str] = {
-    "geom.margin": "contacts begin where surfaces touch",
-    "geom.gap": "contacts begin where surfaces touch",
-    "geom.solmix": "contacts mix by the pair rule",
-    "geom.fluid_ellipsoid": "there is no fluid",
-    "geom.surfacevel": "surfaces do not move by themselves",
-    "joint.margin": "limits act at the limit",
-    "joint.solimp_limit": "limits are as soft as the engine has them",
-    "body.mocap": "it stays where it is",
-    "option.timestep": "the world's `physics` has it",
-    "option.gravity": "the world's `physics` has it",
-    "option.cone": "the world's `physics` has it",
-    "option.impratio": "the world's `physics` has it",
-    "option.density": "there is no fluid",
-    "option.viscosity": "there is no fluid",
-    "option.wind": "there is no fluid",
-}
-"""What it means that a field is left out, where that can be told in general."""
+WHOLE = "texture skin camera light pair sensor numeric text tuple plugin".split()
+"""The elements that are left out with a note each; tendons and flexes have words of their own."""
 
 _CONDIM = {
     1: "contacts have friction where either surface has: a frictionless one is `friction: 0`",
@@ -119,7 +53,7 @@ def early(spec: mujoco.MjSpec) -> list[ImportNote]:
 
 def late(spec: mujoco.MjSpec) -> list[ImportNote]:
     """Notes of all others, and of the options."""
-    kinds = [kind for kind in (*READ, *LEFT_OUT) if kind not in _EARLY]
+    kinds = [kind for kind in (*FIELDS, *WHOLE) if kind not in (*_EARLY, "option")]
     return [*_options(spec), *(note for kind in kinds for note in _of_kind(spec, kind))]
 
 
@@ -143,12 +77,13 @@ def _of_kind(spec: mujoco.MjSpec, kind: str) -> Iterator[ImportNote]:
     elements = [one for one in getattr(spec, plural) if not _of_the_world(kind, one)]
     if not elements:
         return
-    if kind in LEFT_OUT:
-        yield ImportNote("dropped", f"{kind}s", _named(elements, LEFT_OUT[kind]))
+    if kind in WHOLE and (row := whole(kind)) is not None:
+        yield ImportNote("dropped", f"{kind}s", _named(elements, f"are left out: {row.text}"))
         return
     fresh = pristine(kind)
     for field in fields_of(fresh):
-        if field in READ[kind] or field in HARMLESS.get(kind, ()):
+        row, partly = fate(kind, field), PARTLY.get((kind, field))
+        if row is not None and row.fate is not Fate.LEFT_OUT and partly is None:
             continue
         usual = value_of(fresh, field)
         told: dict[str, list[Any]] = {}
@@ -156,7 +91,6 @@ def _of_kind(spec: mujoco.MjSpec, kind: str) -> Iterator[ImportNote]:
             value = value_of(one, field)
             if value == usual and (kind, field) not in {("equality", "active"), ("geom", "contype")}:
                 continue
-            partly = PARTLY.get((kind, field))
             effect = _left_out(kind, field, value) if partly is None else partly(one)
             if effect:
                 told.setdefault(effect, []).append(one)
@@ -189,7 +123,8 @@ def _options(spec: mujoco.MjSpec) -> Iterator[ImportNote]:
             kind = mujoco.mjtDisableBit if field == "disableflags" else mujoco.mjtEnableBit
             named = {name.partition("_")[2].lower(): int(bit) for name, bit in kind.__members__.items() if "_" in name}
             flags = ", ".join(name for name, bit in named.items() if value & bit)
-            yield ImportNote("dropped", f"option flag {field[:-5]}", f"{flags}: is left out, they are MuJoCo's alone")
+            why = "the world's `physics` has gravity, the others" if "gravity" in flags else "they"
+            yield ImportNote("dropped", f"option flag {field[:-5]}", f"{flags}: is left out: {why} are MuJoCo's alone")
         else:
             yield ImportNote("dropped", f"option {field}", _left_out("option", field, value))
 
@@ -213,7 +148,8 @@ def _numbers(value: Any) -> tuple[Any, ...]:
 
 
 def _left_out(kind: str, field: str, value: Any) -> str:
-    effect = EFFECTS.get(f"{kind}.{field}", "")
+    row = fate(kind, field)
+    effect = "" if row is None else row.text
     shown = " ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in value) if isinstance(value, tuple) else value
     shown = str(shown)
     return f"{shown if len(shown) <= 40 else shown[:37] + '…'} is left out" + (f": {effect}" if effect else "")
@@ -223,6 +159,34 @@ def _named(elements: list[Any], effect: str) -> str:
     names = [one.name for one in elements if one.name]
     who = listing(names, 3) if names else "without a name"
     return f"{effect} ({len(elements)}: {who})"
+
+
+def of_tendons(model: Any) -> Iterator[ImportNote]:
+    """Notes of the tendons of a compiled file: what each would do, which is left out; most only measure."""
+    told: dict[str, list[Any]] = {}
+    for t in range(model.ntendon):
+        for effect in tendon_effects(model, t) or ["do nothing in the file either: they only measure"]:
+            told.setdefault(effect, []).append(model.tendon(t))
+    for effect, ones in told.items():
+        idle = "nothing" in effect
+        yield ImportNote(
+            "info" if idle else "dropped", "tendons", _named(ones, effect + ", which is left out" * (not idle))
+        )
+
+
+def tendon_effects(model: Any, t: int) -> list[str]:
+    """What tendon `t` of a compiled file does to its joints and bodies; empty where it only measures."""
+    fields = {"stiffness": "pull as springs", "damping": "damp", "frictionloss": "rub", "armature": "add inertia"}
+    found = [words for field, words in fields.items() if np.any(getattr(model, f"tendon_{field}")[t])]
+    if model.tendon_limited[t]:
+        found.append("limit a length")
+    drives = np.asarray(model.actuator_trntype) == int(mujoco.mjtTrn.mjTRN_TENDON)
+    if np.any(drives & (np.asarray(model.actuator_trnid)[:, 0] == t)):
+        found.append("carry the force of drives")
+    ties = np.asarray(model.eq_type) == int(mujoco.mjtEq.mjEQ_TENDON)
+    if np.any(ties & ((np.asarray(model.eq_obj1id) == t) | (np.asarray(model.eq_obj2id) == t))):
+        found.append("are tied to a length")
+    return found
 
 
 # ------------------------------------------------------------------ fields that are read in part

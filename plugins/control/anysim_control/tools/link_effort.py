@@ -1,4 +1,4 @@
-"""Efforts that a motion of a robot's joints takes: inertia, centrifugal forces, damping, dry friction and weight."""
+"""Efforts that a motion of a robot's joints takes: inertia, gyration, damping, springs, friction and weight."""
 
 from typing import Annotated
 
@@ -32,6 +32,8 @@ class LinkEffort:
         self._model = robot.kinematics
         self._floating = 6 if robot.floating else 0
         self._damping = np.array([robot.world.joints[j].damping for j in robot.joints])
+        self._stiffness = np.array([robot.world.joints[j].stiffness for j in robot.joints])
+        self._rest = np.array([robot.world.joints[j].spring_rest for j in robot.joints])
         self._friction = np.array([robot.world.joints[j].friction for j in robot.joints])
         entry = robot.robot.entry
         cancelled = entry is not None and entry.gravity_compensation
@@ -52,4 +54,5 @@ class LinkEffort:
         if not self.carries:
             effort = effort - model.inverse_dynamics(q, self._still, self._still)
         wanted = joint_vel if wanted_vel is None else wanted_vel
-        return effort[self._floating :] + self._damping * joint_vel + self._friction * np.tanh(wanted / CREEP)
+        passive = self._damping * joint_vel + self._stiffness * (joint_pos - self._rest)
+        return effort[self._floating :] + passive + self._friction * np.tanh(wanted / CREEP)

@@ -1,0 +1,1 @@
+"""Tasks with matter that flows: fluid, sand and rice."""

@@ -1,0 +1,1 @@
+"""Pour water out of a cup into a tray."""

@@ -1,0 +1,60 @@
+"""Ways and wrong states of the tasks with matter that flows."""
+
+from collections.abc import Callable
+from typing import cast
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.task.env import TaskEnv
+from anysim_particles.family import Particles
+from tests.tasks.states import offset, put, seen
+
+BEADS = [f"bead_{number}" for number in range(4)]
+
+
+def particles(env: TaskEnv, name: str) -> Particles:
+    assert env.families is not None
+    return cast(Particles, env.families.family(name))
+
+
+def put_particles(env: TaskEnv, name: str, places: Array) -> None:
+    """Put the particles of a family at places (N, P, 3) [m], at rest."""
+    matter = particles(env, name)
+    matter.x[:], matter.v[:] = places, 0.0
+    env.scene.look(None)
+
+
+def lie_in(env: TaskEnv, name: str, frame: str) -> None:
+    """Lay the particles out in layers of ten by ten, 9 mm apart, about the middle of a frame, from 2 cm on."""
+    count = particles(env, name).x.shape[1]
+    number = np.arange(count)
+    lattice = np.stack([number % 10 - 4.5, number // 10 % 10 - 4.5, number // 100 + 0.0], axis=-1) * 0.009
+    put_particles(env, name, offset(seen(env, frame), z=0.02)[:, None, :3] + lattice)
+
+
+def spill(env: TaskEnv, name: str, share: float) -> None:
+    """A share of the particles lies half a metre aside."""
+    places = particles(env, name).x.copy()
+    places[:, : round(share * places.shape[1]), 0] += 0.5
+    put_particles(env, name, places)
+
+
+def poured(to_tray: Callable[[TaskEnv, float], None]) -> Callable[[TaskEnv, float], None]:
+    """The cup on its way to the tray; there its contents lie in it, beads side by side, or water in layers."""
+
+    def path(env: TaskEnv, share: float) -> None:
+        to_tray(env, share)
+        if share == 1.0 and env.families is not None:
+            lie_in(env, "water", "tray")
+        elif share == 1.0:
+            for number, bead in enumerate(BEADS):
+                put(env, bead, offset(seen(env, "tray"), x=0.03 * number - 0.045, z=0.04))
+
+    return path
+
+
+def spill_beads(env: TaskEnv) -> None:
+    """Half of the beads lie 30 cm aside."""
+    for bead in BEADS[:2]:
+        put(env, bead, offset(seen(env, bead), x=0.3))
