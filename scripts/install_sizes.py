@@ -59,6 +59,7 @@ WORDS = {
     "serving": "`anysim serve`: envs over HTTP and WebSocket",
     "sharded": "worker processes: `engine: {name: pybullet, shards: 2}`",
     "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
+    "soft": "soft blocks, ropes and cloth beside any engine",
     "tactile": "touch: taxels whose forces add up to the engine's, and images of a gel",
     "tasks": "tasks on tables, with tight fits, hands, mobile bases and legs, with their experts",
     "teleop": "`anysim teleop`: demonstrations, driven by an input device",

@@ -15,7 +15,7 @@ from anysim.engine.capability import Capabilities, Capability
 from anysim.families.base import Family
 from anysim.families.cosolver import CoSolver
 
-FAMILIES = ("anysim", "anysim-avatars", "anysim-particles")
+FAMILIES = ("anysim", "anysim-avatars", "anysim-particles", "anysim-soft")
 """The distributions of this repository that bring families."""
 
 

@@ -19,7 +19,7 @@ class FamilyCost(NamedTuple):
     """Physics steps of 4 ms.
 
     Attributes:
-        engine, family, particles, num_envs: what was measured.
+        engine, family, particles, num_envs: what was measured; particles are the points of any matter.
         per_second: steps of one env per second of processor time.
         wall_per_second: steps of all envs together per second.
         alone: steps of one env per second of processor time without the matter.
@@ -71,7 +71,11 @@ def world_of(kind: str, particles: int) -> dict[str, Any]:
 
 def cost(kind: str, particles: int, num_envs: int, engine: str, steps: int) -> FamilyCost:
     """What a physics step costs with matter at rest, and without it."""
-    world = world_of(kind, particles)
+    return cost_in(world_of(kind, particles), kind, num_envs, engine, steps)
+
+
+def cost_in(world: dict[str, Any], called: str, num_envs: int, engine: str, steps: int) -> FamilyCost:
+    """The same in a world whose family `matter` is called so in the table."""
     with _made(world, engine, num_envs) as env:
         env.reset(seed=0)
         action = np.zeros((num_envs, 0))
@@ -85,7 +89,7 @@ def cost(kind: str, particles: int, num_envs: int, engine: str, steps: int) -> F
         alone, _ = _run(lambda: env.engine.step(SUBSTEPS), 20)
         one, _ = _run(lambda: [env.engine.step(1) for _ in range(SUBSTEPS)], 20)
     done = SUBSTEPS * num_envs
-    return FamilyCost(engine, kind, there, num_envs, done / cpu, done / wall, done / alone, done / one)
+    return FamilyCost(engine, called, there, num_envs, done / cpu, done / wall, done / alone, done / one)
 
 
 def _made(world: dict[str, Any], engine: str, num_envs: int) -> Any:

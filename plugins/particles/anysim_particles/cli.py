@@ -1,10 +1,14 @@
 """`anysim bench families`: what matter costs."""
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from anysim.cli.options import AsJson, numbers, parts
+
+if TYPE_CHECKING:
+    from anysim_particles.bench import FamilyCost
 
 
 def families(
@@ -23,7 +27,6 @@ def families(
     Examples:
       anysim bench families --engine mujoco,pybullet,sapien --particles 1000
     """
-    from anysim.cli.output import print_json, print_table
     from anysim_particles.bench import EDGES, cost
 
     found = [
@@ -33,10 +36,17 @@ def families(
         for size in numbers(particles, "--particles", int, 1)
         for envs in numbers(num_envs, "--num-envs", int, 1)
     ]
+    print_costs(found, json=json)
+
+
+def print_costs(found: "Sequence[FamilyCost]", *, json: bool) -> None:
+    """Print them as a table, or as JSON."""
+    from anysim.cli.output import print_json, print_table
+
     if json:
         print_json([one._asdict() for one in found])
         return
-    heads = ("engine", "family", "particles", "envs", "steps/s (cpu)", "steps/s (wall)", "alone", "alone, one by one")
+    heads = ("engine", "family", "points", "envs", "steps/s (cpu)", "steps/s (wall)", "alone", "alone, one by one")
     print_table(
         "Physics steps per second, of one env",
         heads,

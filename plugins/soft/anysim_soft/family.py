@@ -1,0 +1,258 @@
+"""Soft matter as a family: what blocks, ropes and cloth have in common."""
+
+import os
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import ClassVar
+
+import numpy as np
+
+from anysim.assets.model import ImportedModel
+from anysim.conventions import Array
+from anysim.engine.cameras import CameraView
+from anysim.errors import PluginError, SpecError, SpecIssue, listing
+from anysim.families.base import FamilyPart, FamilySetting, FamilyState
+from anysim.families.cosolver import CoSolver, MetBodies
+from anysim.math import pose as P
+from anysim.model.appearance import rgb
+from anysim.model.world import Body, BodyKind
+from anysim.randomization.draw import draw_rows
+from anysim_schemas.base import Spec
+from anysim_soft.spec import MOST, SoftSpec
+from anysim_soft.subworld import FlexSource, Joint, ProxyMass, Scenery, SubWorld
+
+UP = np.array([0.0, 0.0, 1.0])
+
+SHARE = 0.3
+"""Of the impulse that is due to a held body it gets this much in a physics step; the rest follows."""
+
+
+class Soft(CoSolver):
+    """V points in each env, which MuJoCo moves in a world of its own; all that it knows is in `memory`.
+
+    Attributes:
+        x, v: (N, V, 3) [m], [m/s] the points.
+        values: (N, …) the parameters as they are drawn, in the order of `drawn_keys`.
+        pending: (N, K, 6) impulses that held bodies will get.
+    """
+
+    drawn = True
+    label: ClassVar[str]
+    tint: ClassVar[tuple[float, float, float]]
+    drawn_keys: ClassVar[tuple[str, ...]] = ("density", "drag", "friction")
+
+    # ------------------------------------------------------------------ what kinds differ in
+
+    @classmethod
+    @abstractmethod
+    def count(cls, spec: SoftSpec) -> int:
+        """How many points it has."""
+
+    @abstractmethod
+    def source(self, values: Mapping[str, float], pose: Array) -> FlexSource:
+        """The flex with drawn parameters, its frame at a pose (7,)."""
+
+    def attached_sides(self) -> Sequence[tuple[str, str]]:
+        """Which sides of it are held by which bodies."""
+        return ()
+
+    @property
+    @abstractmethod
+    def radius(self) -> float:
+        """[m] of matter around each point."""
+
+    # ------------------------------------------------------------------ the World
+
+    @classmethod
+    def parts(cls, name: str, spec: Spec) -> Iterable[FamilyPart]:
+        assert isinstance(spec, SoftSpec)
+        if (count := cls.count(spec)) > MOST:
+            raise SpecError([SpecIssue("", ".points", f"it has {count:,} points; {MOST:,} at most are possible")])
+        return [FamilyPart(name, ImportedModel(name, (Body("", BodyKind.STATIC),), links={"": 0}), cls.label)]
+
+    # ------------------------------------------------------------------ made
+
+    def __init__(self, setting: FamilySetting) -> None:
+        super().__init__(setting)
+        assert isinstance(setting.spec, SoftSpec)
+        self.soft = setting.spec
+        world, k = setting.engine.world, len(self.met)
+        self.scenery = Scenery.of(world, self.met)
+        entity = np.array(world.body_entity, dtype=np.intp)
+        self._entities = entity[np.concatenate([self.met, self.scenery.still])]
+        self._at = None if setting.spec.at is None else self._root(setting.spec.at)
+        self._heavier = np.ones(k)
+        for name, factor in setting.spec.held.items():
+            self._heavier[self._met(name, "held", loose=True)] = factor
+        self._late = self._held | (self._heavier > 1.0)
+        self._gravity = np.array(world.physics.gravity, dtype=float)
+        self._step = world.physics.dt / self.soft.substeps
+        self._threads = max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
+        self._worlds: dict[int, tuple[bytes, SubWorld]] = {}
+        self.values = self.remember("values", len(self.drawn_keys))
+        self.frame, self.pending = self.remember("frame", 7), self.remember("pending", k, 6)
+        built = ProxyMass(np.ones(k), np.zeros((k, 3)), np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (k, 1)))
+        source = self.source(dict.fromkeys(self.drawn_keys, 0.1), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+        example = SubWorld(source, self.scenery, built, (), self._step, self._gravity)
+        self.faces = example.faces
+        self._nodes = np.zeros(0, dtype=np.intp)
+        self._holders = np.zeros(0, dtype=np.intp)
+        for side, name in self.attached_sides():
+            nodes = np.flatnonzero(source.sides[side])
+            self._nodes = np.concatenate([self._nodes, nodes])
+            self._holders = np.append(self._holders, [self._met(name, "attached", loose=False)] * len(nodes))
+        self.anchors = self.remember("anchors", len(self._nodes), 3)
+        example = SubWorld(source, self.scenery, built, self._joints(self.anchors[0]), self._step, self._gravity)
+        size = len(example.points())
+        self.x, self.v = self.remember("x", size, 3), self.remember("v", size, 3)
+        self.moved, self.state_row = self.remember("moved", 6), self.remember("state", example.state_size)
+
+    def _joints(self, anchors: Array) -> list[Joint]:
+        rows = zip(self._nodes.tolist(), self._holders.tolist(), anchors, strict=True)
+        return [Joint(node, place, anchor.copy()) for node, place, anchor in rows]
+
+    def _root(self, name: str) -> int:
+        """The body that is called so, or the root of the object."""
+        world = self.engine.world
+        entity = world.entity_numbers.get(name)
+        return self.body(name) if entity is None else world.entities[entity].root
+
+    def _met(self, name: str, key: str, *, loose: bool) -> int:
+        """The place in `met` of a body, or of an object's root."""
+        body, bodies = self._root(name), self.engine.world.bodies
+        places = {int(i): place for place, i in enumerate(self.met) if not (loose and self._held[place])}
+        if body not in places:
+            kind = "free body" if loose else "body that moves and"
+            known = listing([bodies[i].name for i in places])
+            raise PluginError(
+                f"world.families.{self.setting.name}.{key}: '{name}' is no {kind} that collides (there are: {known})"
+            )
+        return places[body]
+
+    def drawn_value(self, key: str, env_ids: Array) -> Array:
+        """A parameter as it is in the episodes of these envs."""
+        path = f"world.families.{self.setting.name}.{key}"
+        stream = f"family/{self.setting.name}/{key}"
+        return draw_rows(getattr(self.soft, key), stream, self.setting.streams, env_ids, source=path)
+
+    def parameter(self, key: str, env: int) -> float:
+        """A parameter as it is in an env's episode."""
+        return float(self.values[env, self.drawn_keys.index(key)])
+
+    # ------------------------------------------------------------------ its life
+
+    def fill(self, env_ids: Array) -> None:
+        for column, key in enumerate(self.drawn_keys):
+            self.values[env_ids, column] = self.drawn_value(key, env_ids)
+        place, yaw = self.drawn_value("position", env_ids), self.drawn_value("yaw", env_ids)
+        if self._at is None:
+            place = place + self.setting.origin[env_ids]
+        else:
+            pose = self.engine.get_state().body_pose[env_ids, self._at]
+            heading = P.yaw(pose[:, 3:])
+            place = pose[:, :3] + P.rotate(P.from_axis_angle(UP, heading), place)
+            yaw = yaw + heading
+        self.frame[env_ids] = np.concatenate([place, P.from_axis_angle(UP, yaw)], axis=1)
+        poses = self.engine.get_state().body_pose[:, self.met[self._holders]]
+        for env in env_ids.tolist():
+            one = self._world(env)
+            if len(self._nodes):
+                one.load(one.beginning())
+                away = one.node_places()[self._nodes] - poses[env, :, :3]
+                self.anchors[env] = P.rotate_inverse(poses[env, :, 3:], away)
+                one = self._world(env)
+            self.state_row[env] = one.beginning()
+            one.load(self.state_row[env])
+            self.x[env] = one.points()
+
+    def _world(self, env: int) -> SubWorld:
+        """The model of an env: all that it is made of is in the memory, and it is made anew when that has changed."""
+        parts = (self.values, self.frame, self.anchors, self._mass, self._com, self._inertia)
+        key = b"".join(part[env].tobytes() for part in parts)
+        made = self._worlds.get(env)
+        if made is None or made[0] != key:
+            mass = np.where(self._held, np.inf, self._mass[env] * self._heavier)
+            bodies = ProxyMass(mass, self._com[env].copy(), self._inertia[env] * self._heavier[:, None])
+            values = dict(zip(self.drawn_keys, self.values[env].tolist(), strict=True))
+            source = self.source(values, self.frame[env])
+            joints = self._joints(self.anchors[env])
+            made = (key, SubWorld(source, self.scenery, bodies, joints, self._step, self._gravity))
+            self._worlds[env] = made
+        return made[1]
+
+    def solve(self, env_ids: Array, bodies: MetBodies, duration: float) -> Array:
+        met, still = self.met, self.scenery.still
+        pose, there = bodies.body_pose, bodies.there[:, self._entities]
+        twist = bodies.twist.copy()
+        twist[..., :3] -= P.cross(twist[..., 3:], bodies.com - pose[:, met, :3])
+        impulse = np.zeros((len(env_ids), len(met), 6))
+
+        def one(row: int) -> None:
+            env = int(env_ids[row])
+            if not np.isfinite(self.state_row[env]).all():
+                return
+            sub = self._world(env)
+            sub.load(self.state_row[env])
+            sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
+            sub.place()
+            done = sub.step(self.soft.substeps, self.parameter("drag", env))
+            self.received[env] += done.received
+            self.state_row[env], self.moved[env] = sub.state(), sub.momentum()
+            points = sub.points()
+            self.v[env], self.x[env] = (points - self.x[env]) / duration, points
+            due = self.pending[env] + done.impulse
+            impulse[row] = np.where(self._late[:, None], SHARE * due, due)
+            self.pending[env] = due - impulse[row]
+
+        threads = min(self._threads, len(env_ids))
+        if threads > 1:
+            # a pool a call, so that there is nothing to close and nothing that a fork could lose
+            with ThreadPoolExecutor(threads, "soft") as pool:
+                list(pool.map(one, range(len(env_ids))))
+        else:
+            for row in range(len(env_ids)):
+                one(row)
+        return impulse
+
+    def momentum(self, env_ids: Array) -> Array:
+        """Of the matter, and of what held bodies will get."""
+        return self.moved[env_ids] + self.pending[env_ids].sum(axis=1)
+
+    # ------------------------------------------------------------------ what it looks like and means
+
+    def state(self, env_ids: Array) -> FamilyState:
+        size = self.x.shape[1]
+        ids = np.full(size, self.setting.entities[0] + 1, dtype=np.int32)
+        return FamilyState(
+            self.x[env_ids].copy(), self.v[env_ids].copy(), np.full(size, self.radius), ids, self.faces.copy()
+        )
+
+    def fault(self, env_ids: Array) -> Array:
+        return np.array([not np.isfinite(self.state_row[env]).all() for env in env_ids], dtype=bool)
+
+    def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
+        x = self.x[env]
+        known: dict[str, object] = {"matter": self.label, "mass": self.mass(env)}
+        known |= {"middle": x.mean(axis=0).tolist(), "low": x.min(axis=0).tolist(), "high": x.max(axis=0).tolist()}
+        return {self.setting.name: known}
+
+    @abstractmethod
+    def mass(self, env: int) -> float:
+        """[kg] of an env's matter."""
+
+    def recorded(self, env_ids: Array) -> Mapping[str, Array]:
+        """Momentum of the matter, its middle, and what it received: any difference of a point shows in them."""
+        middle = self.x[env_ids].mean(axis=1)
+        return {"middle": middle, "momentum": self.momentum(env_ids), "received": self.received[env_ids]}
+
+    def color(self) -> tuple[float, float, float]:
+        """Red, green and blue in images."""
+        return self.tint if self.soft.color is None else rgb(self.soft.color)
+
+    def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
+        from anysim_particles.draw import draw_triangles
+
+        mark = self.setting.entities[0] + 1
+        for row, env in enumerate(env_ids.tolist()):
+            draw_triangles(self.x[env], self.faces, self.color(), mark, view, row, images)

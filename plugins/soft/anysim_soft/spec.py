@@ -1,0 +1,125 @@
+"""Parameters of soft matter. What is drawn is drawn for each episode and env."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from anysim_schemas.base import Color, Integer, Positive, Reference, Spec, Vec3
+from anysim_schemas.errors import KeyFault
+from anysim_schemas.values import DensityValue, FloatValue, NonNegativeValue, PositiveValue, Value
+
+MOST = 20_000
+"""Points of a family."""
+
+Side = Annotated[str, Field(pattern=r"^([+-][xyz]){1,3}$")]
+"""Where it ends: `-x` is the face of smallest x, `-x+y` the edge that it shares with `+y`."""
+Edge = Annotated[str, Field(pattern=r"^([+-][xy]){1,2}$")]
+"""Where a sheet ends: `-x` is an edge, `-x+y` a corner."""
+Count = Annotated[Integer, Field(ge=1, le=64)]
+Points = Annotated[Integer, Field(ge=2, le=200)]
+Heavier = Annotated[float, Field(ge=1.0, le=4.0)]
+
+
+class SoftSpec(Spec):
+    """Where soft matter is when an episode begins, and how it is moved."""
+
+    position: Value[Vec3] = Field(default=(0.0, 0.0, 0.0), description="of its frame [m]")
+    yaw: FloatValue = Field(default=0.0, description="of its frame [rad]")
+    at: Reference | None = Field(
+        default=None,
+        description="a body, or an object: `position` is then in its frame, turned by its heading alone, at the reset",
+    )
+    density: DensityValue = Field(default=1000.0, description="of the matter [kg/m^3]")
+    drag: NonNegativeValue = Field(
+        default=0.0, description="rate at which it loses velocity to air at rest [1/s]: exp(-drag t)"
+    )
+    friction: NonNegativeValue = Field(default=0.6, description="coefficient; with a body the larger of the two acts")
+    held: dict[Reference, Heavier] = Field(
+        default_factory=dict,
+        description="free bodies that something else in the engine will hold, and how many times heavier, 1 to 4, they "
+        "are for this matter: a gripped body yields less than its mass says",
+    )
+    color: Color | None = Field(default=None, description="of its surface in images")
+    substeps: Integer = Field(default=1, gt=0, le=50, description="of the solver in a physics step")
+
+
+class DeformableSpec(SoftSpec):
+    """A block of an elastic solid, which is stress-free as the box."""
+
+    box: tuple[Positive, Positive, Positive] = Field(description="edges [m]; its frame is at the middle of its bottom")
+    young: PositiveValue = Field(default=1e5, description="Young's modulus [Pa]")
+    poisson: Value[Annotated[float, Field(ge=0.0, le=0.45)]] = Field(default=0.3, description="Poisson's ratio")
+    damping: NonNegativeValue = Field(
+        default=0.01,
+        description="[s] Rayleigh's: what moves it apart is resisted by the stiffness times this times the rate",
+    )
+    cells: tuple[Count, Count, Count] = Field(
+        default=(1, 1, 1), description="quadratic elements along each edge: what bends needs two or more along it"
+    )
+    points: tuple[Points, Points, Points] = Field(
+        default=(5, 5, 5), description="of a lattice along each edge, of which the outer ones meet bodies and are drawn"
+    )
+    fixed: tuple[Side, ...] = Field(default=(), description="faces, edges or corners that stay where they begin")
+
+    attached: dict[Side, Reference] = Field(
+        default_factory=dict, description="faces, edges or corners that a body holds where they are at the reset"
+    )
+
+    @model_validator(mode="after")
+    def _sizes(self) -> Self:
+        nodes = 1
+        for cells in self.cells:
+            nodes *= 2 * cells + 1
+        if nodes > MOST // 4:
+            raise KeyFault(f"{nodes:,} nodes; {MOST // 4:,} at most are possible", "cells")
+        if max(max(self.box) / min(self.box), 1.0) > 1e3:
+            raise KeyFault("an edge is more than 1000 times as long as another", "box")
+        return self
+
+
+class RopeSpec(SoftSpec):
+    """A rope that stretches by next to nothing and does not resist bending."""
+
+    path: Annotated[tuple[Vec3, ...], Field(min_length=2)] = Field(
+        description="corners [m] of the line along which it lies when an episode begins, in its frame: it is as long"
+    )
+    radius: Positive = Field(default=0.005, description="[m]")
+    segments: Annotated[Integer, Field(ge=2, le=400)] = Field(default=40, description="of equal length, straight each")
+    fixed: tuple[Literal["start", "end"], ...] = Field(default=(), description="ends that stay where they begin")
+    attached: dict[Literal["start", "end"], Reference] = Field(
+        default_factory=dict, description="ends that a body holds where they are at the reset"
+    )
+
+    substeps: Integer = Field(
+        default=4, gt=0, le=50, description="of the solver in a physics step: the more, the more it can carry"
+    )
+
+    @model_validator(mode="after")
+    def _long(self) -> Self:
+        corners = zip(self.path, self.path[1:], strict=False)
+        if min(sum((a - b) ** 2 for a, b in zip(p, q, strict=True)) for p, q in corners) < 1e-12:
+            raise KeyFault("two corners that follow each other are at one place", "path")
+        return self
+
+
+class FemClothSpec(SoftSpec):
+    """A sheet of an elastic material, flat and stress-free in the plane of its frame."""
+
+    size: tuple[Positive, Positive] = Field(description="edges [m]; its frame is at its middle")
+    thickness: PositiveValue = Field(default=0.001, description="[m]")
+    young: PositiveValue = Field(default=1e5, description="Young's modulus [Pa] in the plane")
+    poisson: Value[Annotated[float, Field(ge=0.0, le=0.45)]] = Field(default=0.3, description="Poisson's ratio")
+    bending: NonNegativeValue | None = Field(
+        default=None, description="flexural rigidity of a strip by its width [N m]; young thickness^3 / 12 if not given"
+    )
+    damping: NonNegativeValue = Field(
+        default=0.01,
+        description="[s] Rayleigh's: what moves it apart is resisted by the stiffness times this times the rate",
+    )
+    density: DensityValue = Field(default=300.0, description="of the matter [kg/m^3]")
+    points: tuple[Points, Points] = Field(default=(15, 15), description="along each edge")
+    radius: Positive = Field(default=0.003, description="[m] from its middle at which contacts act")
+    fixed: tuple[Edge, ...] = Field(default=(), description="edges or corners that stay where they begin")
+    attached: dict[Edge, Reference] = Field(
+        default_factory=dict, description="edges or corners that a body holds where they are at the reset"
+    )

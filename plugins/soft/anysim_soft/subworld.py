@@ -1,0 +1,326 @@
+"""A world of its own for soft matter, in MuJoCo: the flex, a proxy of each body that it meets, and what is fixed.
+
+Proxies and what is fixed collide with the flex alone. A proxy has the true mass of its body, and starts each step from
+what the engine says. One of a body that joints hold is so heavy that it moves as it does.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from anysim.conventions import WORLD, Array, wxyz_from_xyzw
+from anysim.math import pose as P
+from anysim.model.world import World
+from anysim_mujoco.geoms import add_assets, add_geom
+
+HEAVY = 1e4
+"""[kg], [kg m^2] of a body that joints hold."""
+STIFF = (0.999, 0.99999, 0.001, 0.5, 2.0)
+"""Impedance of what holds a rope together, or matter at a body."""
+AWAY = -1e4
+"""[m] height of the proxy of a body that is not there."""
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+class FlexSource(NamedTuple):
+    """A flex, written for MuJoCo, and what is changed in it.
+
+    Attributes:
+        xml: the element.
+        fixed: (V,) bool of its nodes, those that do not move.
+        mass: (V,) [kg] of its nodes; empty where the element says it.
+        options: attributes of `option`.
+        sides: (V,) bool by name, the nodes there that bodies hold.
+        adjust: changes the model once it is made.
+    """
+
+    xml: str
+    fixed: Array
+    mass: Array
+    options: Mapping[str, object]
+    sides: Mapping[str, Array] = MappingProxyType({})
+    adjust: Callable[[Any], None] | None = None
+
+
+class Joint(NamedTuple):
+    """A node that a body holds: its number, the body's place in `met`, and where in the body's frame, (3,) [m]."""
+
+    node: int
+    place: int
+    anchor: Array
+
+
+class ProxyMass(NamedTuple):
+    """Bodies that it meets: (K,) [kg], inf where joints hold them, (K, 3) [m] and (K, 6) [kg m^2], body axes."""
+
+    mass: Array
+    com: Array
+    inertia: Array
+
+
+class Scenery(NamedTuple):
+    """The colliding shapes of a World, sorted by what moves them.
+
+    Attributes:
+        world: with these geoms alone.
+        met, still: bodies with proxies, and static ones.
+        number: for each body of `met`, of `still` and for the world itself, the places of its geoms in `world.geoms`.
+        geoms: for each geom of `world` its place in the whole World.
+        weightless: (K,) bool.
+    """
+
+    world: World
+    met: Array
+    still: Array
+    number: Mapping[int, tuple[int, ...]]
+    geoms: Array
+    weightless: Array
+
+    @classmethod
+    def of(cls, world: World, met: Array) -> "Scenery":
+        chosen = [i for i, geom in enumerate(world.geoms) if geom.collides]
+        known = set(met.tolist())
+        bodies = {world.geoms[i].body for i in chosen}
+        still = np.array(sorted(bodies - known - {WORLD}), dtype=np.intp)
+        plain = tuple(replace(world.geoms[i], texture="", material="") for i in chosen)
+        number = {b: tuple(n for n, i in enumerate(chosen) if world.geoms[i].body == b) for b in {*bodies, WORLD}}
+        weightless = np.array([world.bodies[i].gravity_compensation for i in met], dtype=bool)
+        return cls(replace(world, geoms=plain), met, still, number, np.array(chosen, dtype=np.intp), weightless)
+
+
+class Outcome(NamedTuple):
+    """What a physics step did.
+
+    Attributes:
+        impulse: (K, 6) [N s, N m s] on the bodies, about their centres of mass.
+        received: (6,) what the flex got from weight, air and what is fixed, about the world's origin.
+    """
+
+    impulse: Array
+    received: Array
+
+
+class SubWorld:
+    """The model of one env; all that changes is in the state that is passed in and comes out."""
+
+    def __init__(
+        self,
+        source: FlexSource,
+        scenery: Scenery,
+        bodies: ProxyMass,
+        joints: Sequence[Joint],
+        dt: float,
+        gravity: Array,
+    ) -> None:
+        self.scenery, self.gravity, self.source = scenery, np.array(gravity, dtype=float), source
+        self.model = model = _compiled(source, scenery, bodies, joints, dt, gravity)
+        self.data = mujoco.MjData(model)
+        self.held = ~np.isfinite(bodies.mass)
+        nodes = model.flex_nodebodyid if model.flex_interp[0] else model.flex_vertbodyid
+        self.nodes = np.array(nodes, dtype=np.intp)
+        self._moving = self.nodes[model.body_dofnum[self.nodes] > 0]
+        self._dofs = model.body_dofadr[self._moving][:, None] + np.arange(3)
+        self.mass = np.array(model.body_mass[self._moving])
+        self._axis = np.full(model.nv, -1)
+        self._axis[self._dofs] = np.arange(3)
+        self._uneven = bool(model.flex_interp[0])
+        self._pinned = len(self._moving) < len(self.nodes)
+        k, s = len(scenery.met), len(scenery.still)
+        free = [model.body(f"met {i}").jntadr[0] for i in range(k)]
+        self._pose = model.jnt_qposadr[free].reshape(k, 1) + np.arange(7)
+        self._twist = model.jnt_dofadr[free].reshape(k, 1) + np.arange(6)
+        self._mocap = model.body_mocapid[[model.body(f"still {i}").id for i in range(s)]]
+        self._geoms = np.array([model.geom(f"{i}").id for i in range(len(scenery.geoms))], dtype=np.intp)
+        self._com = bodies.com
+        self.faces = _faces(model)
+
+    @property
+    def state_size(self) -> int:
+        """Numbers of a state."""
+        return int(mujoco.mj_stateSize(self.model, STATE))
+
+    def beginning(self) -> Array:
+        """The state in which nothing has moved yet."""
+        mujoco.mj_resetData(self.model, self.data)
+        return self._state()
+
+    def _state(self) -> Array:
+        state = np.empty(self.state_size)
+        mujoco.mj_getState(self.model, self.data, state, STATE)
+        return state
+
+    def load(self, state: Array) -> None:
+        """Take up a state, and work out where everything is."""
+        mujoco.mj_setState(self.model, self.data, state, STATE)
+        self.place()
+
+    def place(self) -> None:
+        """Where points and bodies are, by the coordinates."""
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_flex(self.model, self.data)
+
+    def points(self) -> Array:
+        """(V, 3) [m] the vertices."""
+        return self.data.flexvert_xpos.copy()
+
+    def node_places(self) -> Array:
+        """(V, 3) [m] the nodes."""
+        return self.data.xpos[self.nodes].copy()
+
+    def momentum(self) -> Array:
+        """(6,) of the flex, about the world's origin."""
+        p = self.mass[:, None] * self.data.qvel[self._dofs]
+        return np.concatenate([p.sum(axis=0), P.cross(self.data.xpos[self._moving], p).sum(axis=0)])
+
+    def meet(self, pose: Array, twist: Array, still: Array, there: Array, friction: Array) -> None:
+        """Put the proxies to poses (K, 7) and twists (K, 6) of their frames, and what stands still to poses (S, 7).
+
+        `there` (K + S,) bool; `friction` (G,) of the World's geoms.
+        """
+        data, k = self.data, len(pose)
+        turn = wxyz_from_xyzw(pose[:, 3:])
+        data.qpos[self._pose] = np.concatenate([pose[:, :3], turn], axis=1)
+        data.qpos[self._pose[~there[:k], 2]] = AWAY
+        spin = P.rotate_inverse(pose[:, 3:], twist[:, 3:])
+        data.qvel[self._twist] = np.concatenate([twist[:, :3], spin], axis=1)
+        data.mocap_pos[self._mocap], data.mocap_quat[self._mocap] = still[:, :3], wxyz_from_xyzw(still[:, 3:])
+        data.mocap_pos[self._mocap[~there[k:]], 2] = AWAY
+        self.model.geom_friction[self._geoms, 0] = friction[self.scenery.geoms]
+
+    def step(self, substeps: int, drag: float) -> Outcome:
+        """Move on by `substeps` steps, from a state that was loaded."""
+        model, data, h = self.model, self.data, self.model.opt.timestep
+        impulse, received = np.zeros((len(self._pose), 6)), np.zeros(6)
+        slower = (1.0 - np.exp(-drag * h)) / h
+        for _ in range(substeps):
+            before = self.momentum()
+            at, air = data.xpos[self._moving].copy(), -slower * self.mass[:, None] * data.qvel[self._dofs]
+            data.qfrc_applied[self._dofs] = air
+            turn = P.to_matrix(data.qpos[self._pose[:, 3:]][:, [1, 2, 3, 0]])
+            arm = np.einsum("kij,kj->ki", turn, self._com)
+            centre = data.qpos[self._pose[:, :3]] + arm
+            mujoco.mj_step1(model, data)
+            if self._uneven:
+                self._even_contacts()
+            mujoco.mj_step2(model, data)
+            force = data.qfrc_constraint[self._twist]
+            torque = np.einsum("kij,kj->ki", turn, force[:, 3:]) - P.cross(arm, force[:, :3])
+            got = h * np.concatenate([force[:, :3], torque], axis=1)
+            impulse += got
+            self.place()
+            received += self._from_elsewhere(before, at, air, got, centre, h)
+        data.qfrc_applied[:] = 0.0
+        return Outcome(impulse, received)
+
+    def _even_contacts(self) -> None:
+        """Make the rows of contacts push the flex as much as what it touches.
+
+        Quadratic elements weigh some nodes negatively, and MuJoCo leaves these out of its Jacobian: what is left
+        sums up to more than one, and a tenth of the momentum would come from nowhere. Here it is scaled to one.
+        """
+        model, data = self.model, self.data
+        rows = np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)
+        if not len(rows):
+            return
+        if mujoco.mj_isSparse(model):
+            counts, begins = data.efc_J_rownnz[rows], data.efc_J_rowadr[rows]
+            entries = np.repeat(begins - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+            owner, column = np.repeat(np.arange(len(rows)), counts), data.efc_J_colind[entries]
+        else:
+            entries = (rows[:, None] * model.nv + np.arange(model.nv)).ravel()
+            owner, column = np.repeat(np.arange(len(rows)), model.nv), np.tile(np.arange(model.nv), len(rows))
+        flat = data.efc_J.reshape(-1)
+        own = self._axis[column] >= 0
+        entries, owner, axis = entries[own], owner[own], self._axis[column[own]]
+        sums = np.zeros((len(rows), 3))
+        np.add.at(sums, (owner, axis), flat[entries])
+        flat[entries] /= np.where((size := P.norm(sums)) > 0, size, 1.0)[owner]
+        mujoco.mj_referenceConstraint(model, data)
+
+    def _from_elsewhere(self, before: Array, at: Array, air: Array, got: Array, centre: Array, h: float) -> Array:
+        """What the flex got from all but the bodies that it meets."""
+        if self._pinned:  # what holds it has no force of its own in MuJoCo: it gives what is missing
+            change = self.momentum() - before
+            return change + _about_origin(got, centre)
+        force = self.data.qfrc_constraint[self._dofs] + self.mass[:, None] * self.gravity + air
+        found = h * np.concatenate([force.sum(axis=0), P.cross(at, force).sum(axis=0)])
+        return found + _about_origin(got, centre)
+
+    def state(self) -> Array:
+        """The state as it is now."""
+        return self._state()
+
+
+def _about_origin(impulse: Array, centre: Array) -> Array:
+    """(6,) the sum of impulses (K, 6) about centres (K, 3), about the world's origin."""
+    turned = impulse[:, 3:] + P.cross(centre, impulse[:, :3])
+    return np.concatenate([impulse[:, :3].sum(axis=0), turned.sum(axis=0)])
+
+
+def _faces(model: Any) -> Array:
+    """(F, 3) int32 triangles of the surface, outward; none of a line."""
+    dim = int(model.flex_dim[0])
+    if dim == 1:
+        return np.zeros((0, 3), dtype=np.int32)
+    flat = model.flex_elem if dim == 2 else model.flex_shell
+    return np.array(flat, dtype=np.int32).reshape(-1, 3)
+
+
+def _compiled(
+    source: FlexSource, scenery: Scenery, bodies: ProxyMass, joints: Sequence[Joint], dt: float, gravity: Array
+) -> Any:
+    options = " ".join(f'{key}="{value}"' for key, value in source.options.items())
+    pull = " ".join(repr(float(g)) for g in gravity)
+    spec = mujoco.MjSpec.from_string(
+        f'<mujoco><compiler alignfree="false" fusestatic="false"/>'
+        f'<option timestep="{dt!r}" gravity="{pull}" {options}><flag autoreset="disable"/></option>'
+        f"<worldbody>{source.xml}</worldbody></mujoco>"
+    )
+    model = spec.compile()
+    nodes = model.flex_nodebodyid if model.flex_interp[0] else model.flex_vertbodyid
+    for place, body in enumerate(nodes):
+        element = spec.body(model.body(body).name)
+        if len(source.mass):
+            element.mass = source.mass[place]
+        if source.fixed[place]:
+            for joint in list(element.joints):
+                spec.delete(joint)
+    add_assets(spec, scenery.world)
+    _add_shapes(spec, spec.worldbody, scenery.number.get(WORLD, ()), scenery)
+    for place, body in enumerate(scenery.still.tolist()):
+        element = spec.worldbody.add_body(name=f"still {place}", mocap=True)
+        _add_shapes(spec, element, scenery.number[body], scenery)
+    for place, body in enumerate(scenery.met.tolist()):
+        held = not np.isfinite(bodies.mass[place])
+        compensated = held or bool(scenery.weightless[place])
+        element = spec.worldbody.add_body(name=f"met {place}", gravcomp=float(compensated))
+        element.add_freejoint()
+        element.explicitinertial, element.ipos = True, bodies.com[place]
+        element.mass = HEAVY if held else bodies.mass[place]
+        moments = np.array([HEAVY] * 3 + [0.0] * 3) if held else bodies.inertia[place]
+        element.fullinertia = moments
+        _add_shapes(spec, element, scenery.number[body], scenery, touches=place not in {j.place for j in joints})
+    names = [model.body(body).name for body in nodes]
+    for joint in joints:
+        element = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY)
+        element.name1, element.name2 = f"met {joint.place}", names[joint.node]
+        element.solref, element.solimp = [2 * dt, 1.0], STIFF
+    made = spec.compile()
+    for row, joint in zip(np.flatnonzero(made.eq_type == mujoco.mjtEq.mjEQ_CONNECT), joints, strict=True):
+        made.eq_data[row, :3], made.eq_data[row, 3:6] = joint.anchor, 0.0
+    if source.adjust is not None:
+        source.adjust(made)
+    return made
+
+
+def _add_shapes(spec: Any, owner: Any, numbers: Iterable[int], scenery: Scenery, *, touches: bool = True) -> None:
+    """Add shapes of the World to a body; what holds the flex does not touch it."""
+    for number in numbers:
+        element = add_geom(spec, owner, scenery.world.geoms[number], scenery.world)
+        element.name, element.material = f"{number}", ""
+        element.contype, element.conaffinity, element.priority = int(touches), 0, 0
