@@ -1,4 +1,4 @@
-"""What lies in the folder of runs: recorded runs, and folders with pages such as reports and comparisons."""
+"""Entries of the folder of runs: recorded runs, and folders with pages such as reports and comparisons."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""What is installed, for people: engines that run here, tasks with their pictures, robots."""
+"""Installed engines, tasks with their pictures, and robots, as a person is told of them."""
 
 import sys
 from functools import lru_cache
