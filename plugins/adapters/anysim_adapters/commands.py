@@ -11,6 +11,6 @@ if TYPE_CHECKING:
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
     """`anysim openenv`."""
-    from anysim_adapters.openenv import cli
+    from anysim_adapters.cli import openenv
 
-    app.command("openenv")(cli.openenv)
+    app.command("openenv")(openenv.openenv)

@@ -8,7 +8,7 @@ import typer
 
 from anysim.cli.options import Engine, Overrides
 
-PORT = 8471
+PORT = 8472
 
 
 def openenv(
