@@ -28,7 +28,7 @@ def _thrown(engine: str, kind: str) -> tuple[float, float]:
         return float(np.abs(ours + theirs).max()), float(np.abs(theirs).max())
 
 
-@pytest.mark.parametrize("kind", ["fluid", "sand"])
+@pytest.mark.parametrize("kind", ["fluid", pytest.param("sand", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("engine", ["mujoco", *(pytest.param(e, marks=pytest.mark.slow) for e in ENGINES[1:])])
 def test_bodies_get_what_matter_loses(engine, kind):
     lost, traded = _thrown(engine, kind)

@@ -117,10 +117,9 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize(
-    "kind", ["deformable", *(pytest.param(k, marks=pytest.mark.slow) for k in ("rope", "fem_cloth"))]
-)
-@EACH
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", OPTIONS)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_the_suite_clears_it(engine, kind, tmp_path: Path):
     """Matter that falls onto a ball: snapshots, partial resets and steps, and what is lost, as the suite has it."""
     require_engine(engine)
