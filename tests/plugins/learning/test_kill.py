@@ -40,7 +40,7 @@ def dying(function, call, after):
         return told
     return wrapped
 
-moment = sys.argv.pop(1)
+moment, policy = sys.argv.pop(1), int(sys.argv.pop(1))
 from anysim_learning import checkpoint, export, train
 from anysim_learning.batch import Batch
 
@@ -50,7 +50,7 @@ elif moment == "in an exam":
     from anysim_learning import exam
     exam._acted = dying(exam._acted, 45, False)
 elif moment == "before the policy":
-    export.export = dying(export.export, 3, False)
+    export.export = dying(export.export, policy, False)
 elif moment == "before the curve":
     train.write_whole = dying(train.write_whole, 4, False)
 elif moment == "before the checkpoint":
@@ -74,9 +74,10 @@ main()
 """
 
 
-def trained(out: Path, learner: str, moment: str = "") -> int:
-    """Run the command in a process of its own; its exit code."""
-    program = [sys.executable, "-c", KILLED, moment, "train", *WORDS, "--learner", learner, *OPTIONS, "--out", str(out)]
+def trained(out: Path, learner: str, moment: str = "", policy: int = 1) -> int:
+    """Run the command in a process of its own; its exit code. `policy` is how many are written when it is killed."""
+    words = ["train", *WORDS, "--learner", learner, *OPTIONS, "--out", str(out)]
+    program = [sys.executable, "-c", KILLED, moment, str(policy), *words]
     told = subprocess.run(
         program, capture_output=True, text=True, timeout=300, env={**os.environ, "OMP_NUM_THREADS": "1"}
     )
@@ -94,7 +95,15 @@ def checkpoint_steps(out: Path) -> int:
     """How far the last whole checkpoint is."""
     from anysim_learning import checkpoint
 
+    if not (out / "checkpoint.npz").exists():
+        return 0
     return int(checkpoint.load(out / "checkpoint.npz")["steps"])
+
+
+def improvements(out: Path) -> list[int]:
+    """The exams, from 0, after which a policy was written: those that no earlier one surpasses."""
+    marks = [(row["exam"], row["exam_reward"]) for row in curve(out)]
+    return [number for number, mark in enumerate(marks) if mark >= max(marks[: number + 1])]
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +124,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 MOMENTS = {
     "in a stretch": 2,
     "in an exam": 2,
-    "before the policy": 2,
+    "before the policy": None,  # the last that is written: after as many checkpoints as there were exams before
     "before the curve": 2,
     "before the checkpoint": 2,
     "in the checkpoint": 2,
@@ -130,8 +139,12 @@ def test_a_killed_training_goes_on_to_the_same_curve(
     learner: str, moment: str, whole: Callable[[str], Path], tmp_path: Path
 ) -> None:
     undisturbed, out = whole(learner), tmp_path / learner
-    assert trained(out, learner, moment) == -signal.SIGKILL
-    assert checkpoint_steps(out) == 32 * MOMENTS[moment], "at most an interval is lost"
+    better = improvements(undisturbed)
+    assert trained(out, learner, moment, len(better)) == -signal.SIGKILL
+    whole_ones = MOMENTS[moment]
+    assert checkpoint_steps(out) == 32 * (better[-1] if whole_ones is None else whole_ones), (
+        "at most an interval is lost"
+    )
     assert trained(out, learner) == 0
     assert curve(out) == curve(undisturbed)
     assert (out / "policy.onnx").read_bytes() == (undisturbed / "policy.onnx").read_bytes()
