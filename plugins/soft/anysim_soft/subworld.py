@@ -146,9 +146,10 @@ class SubWorld:
     def beginning(self) -> Array:
         """The state in which nothing has moved yet."""
         mujoco.mj_resetData(self.model, self.data)
-        return self._state()
+        return self.state()
 
-    def _state(self) -> Array:
+    def state(self) -> Array:
+        """The state as it is now."""
         state = np.empty(self.state_size)
         mujoco.mj_getState(self.model, self.data, state, STATE)
         return state
@@ -250,10 +251,6 @@ class SubWorld:
         force = self.data.qfrc_constraint[self._dofs] + self.mass[:, None] * self.gravity + air
         found = h * np.concatenate([force.sum(axis=0), P.cross(at, force).sum(axis=0)])
         return found + _about_origin(got, centre)
-
-    def state(self) -> Array:
-        """The state as it is now."""
-        return self._state()
 
 
 def _about_origin(impulse: Array, centre: Array) -> Array:

@@ -86,7 +86,6 @@ class LiveView(View):
         self.dt = env.engine.world.physics.control_dt
         self._actor = Actor(env, NOTHING if policy is None else policy)
         self._curve, self._changes = Curve(), -1
-        self._video: Video | None = None
         self._wanted, self._drawing = Selection(), Drawing(page, env.engine.world)
         self._build(names_of(env, policy), play)
         self.reset()
@@ -145,23 +144,8 @@ class LiveView(View):
             raise TaskError(f"pause to move {thing.label}: while time goes on, physics alone moves it")
         put(self.env, self.i, thing, pose)
 
-    def record(self) -> None:
-        """Begin a video, or complete the one that is being made."""
-        if self._video is None:
-            camera = among("camera", self._film.value, self._cameras)
-            first = picture(self.env, camera, self.i)
-            self._video = Video(self.env, self.i, camera, first, self._out)
-            self._record.label = "Stop"
-            return
-        done, self._video = self._video, None
-        self._record.label = "Record"
-        self.page.tell(f"{done.finish()}: {done.frames} pictures")
-
-    def close(self) -> None:
-        """Complete the video that is being made."""
-        if self._video is not None:
-            self._video.finish()
-            self._video = None
+    def _begin_video(self, camera: str) -> Video:
+        return Video(self.env, self.i, camera, picture(self.env, camera, self.i), self._out)
 
     # ------------------------------------------------------------------ time goes on
 

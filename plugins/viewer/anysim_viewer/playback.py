@@ -42,7 +42,6 @@ class Playback(View):
         super().__init__(page)
         self.trajectories, self.number, self.at, self._out = trajectories, 0, 0, out
         self._stage, self._wanted = Stage(order), Selection()
-        self._video: Video | None = None
         self._drawing: Drawing | None = None
         self._play_at_once = play
         self.begin(0)
@@ -82,22 +81,12 @@ class Playback(View):
         if self._slider.value != self.at:
             self._slider.value = self.at
 
-    def record(self) -> None:
-        """Begin a video, or complete the one that is being made."""
-        if self._video is None:
-            camera = among("camera", self._film.value, self._cameras)
-            self._video = Video(self._staged.env, 0, camera, self._picture(camera), self._out)
-            self._record.label = "Stop"
-            return
-        done, self._video = self._video, None
-        self._record.label = "Record"
-        self.page.tell(f"{done.finish()}: {done.frames} pictures")
+    def _begin_video(self, camera: str) -> Video:
+        return Video(self._staged.env, 0, camera, self._picture(camera), self._out)
 
     def close(self) -> None:
         """Complete the video that is being made, and free the engine."""
-        if self._video is not None:
-            self._video.finish()
-            self._video = None
+        super().close()
         self._stage.close()
 
     # ------------------------------------------------------------------ time goes on

@@ -3,10 +3,13 @@
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
 
 from anysim.errors import AnysimError
-from anysim_viewer.controls import Transport
+from anysim_viewer.controls import Transport, among
 from anysim_viewer.page import Page
+from anysim_viewer.video import Video
 
 RATE = 20.0
 """Moments a second that are sent at most [Hz]."""
@@ -25,10 +28,14 @@ class View(ABC):
 
     transport: Transport
     dt: float
+    _cameras: Sequence[str]
+    _film: Any
+    _record: Any
 
     def __init__(self, page: Page) -> None:
         self.page = page
         self._watched = False
+        self._video: Video | None = None
 
     @abstractmethod
     def forward(self) -> None:
@@ -37,6 +44,26 @@ class View(ABC):
     @abstractmethod
     def show(self) -> None:
         """Send what there is to see now."""
+
+    @abstractmethod
+    def _begin_video(self, camera: str) -> Video:
+        """A video of what a camera sees, with its first picture."""
+
+    def record(self) -> None:
+        """Begin a video, or complete the one that is being made."""
+        if self._video is None:
+            self._video = self._begin_video(among("camera", self._film.value, self._cameras))
+            self._record.label = "Stop"
+            return
+        done, self._video = self._video, None
+        self._record.label = "Record"
+        self.page.tell(f"{done.finish()}: {done.frames} pictures")
+
+    def close(self) -> None:
+        """Complete the video that is being made."""
+        if self._video is not None:
+            self._video.finish()
+            self._video = None
 
     def run(self, stop: threading.Event) -> None:
         """Go on until `stop` is set; `Page.ask` wakes the loop."""
