@@ -196,6 +196,7 @@ check-tables:
 	$(BIN)/python scripts/task_gallery.py --check
 	$(BIN)/python scripts/task_pages.py --check
 	$(BIN)/python scripts/task_robots.py --check
+	$(BIN)/python scripts/household_table.py --check
 	$(BIN)/python scripts/install_sizes.py --check
 check-types:
 	$(BIN)/pyright
@@ -221,6 +222,7 @@ docs: schema $(TEST)  ## write what is generated and run the examples of docs/
 	$(BIN)/python scripts/importing_table.py
 	$(BIN)/python scripts/matter_table.py
 	$(BIN)/python scripts/robot_table.py
+	$(BIN)/python scripts/household_table.py
 	$(BIN)/python -m pytest tests/docs $(ARGS)
 
 site: $(SITE)  ## build the documentation with its API pages into build/site

@@ -37,6 +37,7 @@ WORDS = {
     "evaluation": "`anysim evaluate`, `anysim benchmark`: how often policies solve tasks, and whether engines agree",
     "export": "`anysim export`: recorded runs as data sets of LeRobot, robomimic, RLDS and webdataset; `anysim tape`",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
+    "household": "a pack of nearly a hundred household objects and tools: vessels, packages, food, tools, appliances",
     "inspect": "`anysim list`, `check`, `doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, drawn, kept",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",
     "language": "`anysim describe`, `anysim vqa`: scenes and episodes in words, questions with verified answers",

@@ -1,7 +1,7 @@
 """Links made of solids, which a builder adds up to a model, with masses and inertias that follow from the solids."""
 
-from collections.abc import Sequence
-from math import cos, inf, pi, sin, tan
+from collections.abc import Iterator, Sequence
+from math import atan2, cos, hypot, inf, pi, sin, tan
 
 import numpy as np
 
@@ -213,3 +213,21 @@ def ring(
         place = (middle * cos(angle), middle * sin(angle), height / 2)
         turn = turned((0.0, 0.0, 1.0), angle)
         body.solid(link, f"{name}_{i + 1}", wide, place, density, color, turn, filled=sector)
+
+
+def flared_boards(foot: float, rim: float, height: float, wall: float, pieces: int) -> Iterator[tuple[Box, Vec3, Quat]]:
+    """The wall of a vessel [m] about z, from the edge of its floor, which is `wall` thick, to its rim.
+
+    Boards with their places and turns; radii are inside, and outside the boards' corners are beyond their middles.
+    """
+    out, up = rim - foot, height - wall
+    lean = atan2(out, up)
+    # the inner side goes from the edge of the floor to the rim
+    middle = ((rim + foot) / 2 + wall / 2 * cos(lean), (height + wall) / 2 - wall / 2 * sin(lean))
+    board = Box((wall / 2, max(rim, foot) * tan(pi / pieces), hypot(out, up) / 2))
+    leaning = P.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(lean))
+    for i in range(pieces):
+        angle = 2 * pi * i / pieces
+        turn = P.multiply(P.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(angle)), leaning)
+        x, y, z, w = turn.tolist()
+        yield board, (middle[0] * cos(angle), middle[0] * sin(angle), middle[1]), (x, y, z, w)

@@ -1,14 +1,9 @@
 """A bowl: a flared wall of boards in a ring, and a bottom."""
 
-from math import atan2, cos, hypot, pi, sin, tan
-
-import numpy as np
-
 from anysim.assets.model import ImportedModel
-from anysim.math import pose as P
 from anysim.model.affordances import Affordance, AffordanceKind
-from anysim.model.world import Box, Cylinder
-from anysim_assets.assembly import Assembly
+from anysim.model.world import Cylinder
+from anysim_assets.assembly import Assembly, flared_boards
 from anysim_schemas.base import Color, Positive
 from anysim_schemas.errors import KeyFault
 
@@ -47,18 +42,8 @@ def bowl(
         raise KeyFault(f"walls of {wall:g} m leave no room in a height of {height:g} m", "wall")
     body = Assembly("bowl")
     body.solid(0, "bottom", Cylinder(foot, wall / 2), (0.0, 0.0, wall / 2), density, color)
-    out, up = radius - foot, height - wall
-    lean = atan2(out, up)
-    # the inner side goes from the edge of the floor to the rim
-    middle = ((radius + foot) / 2 + wall / 2 * cos(lean), (height + wall) / 2 - wall / 2 * sin(lean))
-    board = Box((wall / 2, radius * tan(pi / _SEGMENTS), hypot(out, up) / 2))
-    leaning = P.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(lean))
-    for i in range(_SEGMENTS):
-        angle = 2 * pi * i / _SEGMENTS
-        turn = P.multiply(P.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(angle)), leaning)
-        x, y, z, w = turn.tolist()
-        at = (middle[0] * cos(angle), middle[0] * sin(angle), middle[1])
-        body.solid(0, f"wall_{i + 1}", board, at, density, color, (x, y, z, w))
+    for i, (board, at, turn) in enumerate(flared_boards(foot, radius, height, wall, _SEGMENTS)):
+        body.solid(0, f"wall_{i + 1}", board, at, density, color, turn)
     body.site(0, "inside", (0.0, 0.0, wall))
     body.site(0, "rim", (0.0, 0.0, height))
     walls = tuple(f"base.wall_{i + 1}" for i in range(_SEGMENTS))
