@@ -1,4 +1,4 @@
-"""The team of docs/worlds: five kinds of robot in one file, on every engine, for two seconds; in 16 envs, often in two."""
+"""The team of docs/worlds: five kinds of robot in one file, on every engine, for two seconds; in 16 envs, often 2."""
 
 from pathlib import Path
 
