@@ -35,9 +35,7 @@ def _solve(matrix: Array, right: Array, least: float, out: Array) -> None:
     Pivots up to `least` are no equation either. The matrix and the right side are overwritten.
     """
     q = right.shape[0]
-    order = np.empty(q, dtype=np.int64)
-    for i in range(q):
-        order[i] = i
+    order = np.arange(q)
     rank = q
     for i in range(q):
         least = max(least, NOTHING * matrix[i, i])
@@ -57,8 +55,7 @@ def _solve(matrix: Array, right: Array, least: float, out: Array) -> None:
             right[b] -= share * right[a]
             for k in range(i + 1, q):
                 matrix[b, order[k]] -= share * matrix[a, order[k]]
-    for i in range(q):
-        out[i] = 0.0
+    out[:] = 0.0
     for i in range(rank - 1, -1, -1):
         a = order[i]
         total = right[a]
@@ -145,9 +142,7 @@ def _straight(gap: Array, lever: Array, stiffness: Array, along: Array, force: f
 
     From where all that could touch does, each step of Newton's method comes nearer from beyond.
     """
-    far, speed = np.inf, np.empty(gap.shape[0])
-    for i in range(gap.shape[0]):
-        speed[i] = 0.0
+    far, speed = np.inf, np.zeros(gap.shape[0])
     for a in range(along.shape[0]):
         for i in range(gap.shape[0]):
             speed[i] += lever[a, i] * along[a]
@@ -243,10 +238,7 @@ def press(
         for a in range(q):
             largest += stiffness[i] * lever[a, i] ** 2
     for e in range(gap.shape[0]):
-        for a in range(q):
-            motion[e, a] = 0.0
-        for i in range(gap.shape[1]):
-            deep[e, i] = 0.0
+        motion[e], deep[e] = 0.0, 0.0
         if not force[e] > 0.0:
             continue
         far = _straight(gap[e], lever, stiffness, along[e], force[e])
@@ -293,8 +285,7 @@ def share(push: Array, points: Array, normals: Array, wrench: Array, force: Arra
             m0, m1, m2 = m0 + p * x, m1 + p * y, m2 + p * z
             l0, l1, l2 = l0 - a, l1 - b, l2 - c
             t0, t1, t2 = t0 - (y * c - z * b), t1 - (z * a - x * c), t2 - (x * b - y * a)
-        for k in range(6):
-            total[e, k] = 0.0
+        total[e] = 0.0
         if not strong > 0.0:
             continue
         m0, m1, m2, l0, l1, l2 = m0 / strong, m1 / strong, m2 / strong, l0 / strong, l1 / strong, l2 / strong
