@@ -26,7 +26,8 @@ DEMO_OUT ?= runs/demo
 # More words for pytest: make test ARGS="-k pose -x"
 ARGS ?=
 # A worker for each core, each with engines of its own and up to 3 GB. One process: make test ARGS="-n 0"
-PYTEST = $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
+# What Python compiles is kept where PYTHONDONTWRITEBYTECODE is set too: pytest compiles 600 files of tests, in each worker.
+PYTEST = PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
 
 # An environment of its own, in which the packages of .venv are too.
 define beside

@@ -31,6 +31,27 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["ANYSIM_CACHE_DIR"] = str(ROOT / ".cache" / "tests")
 
 
+COMPILING = (
+    "plugins/sensors/test_batching.py::test_an_envs_bits_do_not_depend_on_the_batch_or_on_threads[rays-60]",
+    "plugins/particles/test_category.py::test_particles_are_a_category_of_which_each_env_has_its_own_number",
+    "plugins/sensors/test_camera.py::test_depth_and_segmentation_are_those_of_the_reference",
+    "plugins/tactile/test_touch.py::test_sums_are_the_engines_force_and_moment[ball-mujoco]",
+    "plugins/sensors/test_batching.py::test_an_envs_bits_do_not_depend_on_the_batch_or_on_threads[distances-60]",
+    "plugins/sensors/test_camera.py::test_flow_is_where_points_have_come_from",
+    "plugins/particles/test_exchange.py::test_a_body_of_joints_moves_matter_and_feels_it",
+    "plugins/tactile/test_touch.py::test_promises[pad]",
+    "plugins/sensors/test_declared.py::test_they_keep_their_promises[ring]",
+)
+"""Tests for which numba compiles most of the kernels in a new checkout, each of them other ones."""
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Those that compile go first, one to each worker: what is compiled is there for all that comes after."""
+    turn = {f"tests/{name}": number for number, name in enumerate(COMPILING)}
+    items.sort(key=lambda item: turn.get(item.nodeid, len(turn)))
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_finish() -> None:
     """Ten thousand tests live until the end: each full collection that an engine asks for would go through them."""

@@ -1,4 +1,4 @@
-"""Tiers of what is run on every engine: often on MuJoCo and one of the others, on all of them before a release."""
+"""Tiers of what is run on every engine: often on one or two of them, on all of them before a release."""
 
 from collections.abc import Collection, Iterable
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 OTHERS = ("pybullet", "sapien")
+ENGINES = ("mujoco", *OTHERS)
 
 
 def by_turns(names: Iterable[str], long: Collection[str] = ()) -> list[Any]:
@@ -13,9 +14,41 @@ def by_turns(names: Iterable[str], long: Collection[str] = ()) -> list[Any]:
 
     Those that take long are slow on MuJoCo alone.
     """
-    found: list[Any] = []
-    for number, name in enumerate(names):
-        often = ("mujoco",) if name in long else ("mujoco", OTHERS[number % 2])
-        for engine in ("mujoco", *OTHERS):
-            found.append(pytest.param(name, engine, marks=pytest.mark.slow if engine in often else pytest.mark.full))
-    return found
+    return [
+        _tiered(name, engine, engine == "mujoco" or (name not in long and engine == OTHERS[number % 2]))
+        for number, name in enumerate(names)
+        for engine in ENGINES
+    ]
+
+
+def in_turn(*columns: Iterable[Any]) -> list[Any]:
+    """Parameters (name, engine), or more columns: slow on one engine, each in its turn; full on the rest."""
+    return [
+        _tiered(*row, engine, engine == ENGINES[number % 3])
+        for number, row in enumerate(zip(*columns, strict=True))
+        for engine in ENGINES
+    ]
+
+
+def others_in_turn(*columns: Iterable[Any]) -> list[Any]:
+    """Parameters (name, engine) without MuJoCo, which is tried elsewhere: slow on one engine, full on the other."""
+    return [
+        _tiered(*row, engine, engine == OTHERS[number % 2])
+        for number, row in enumerate(zip(*columns, strict=True))
+        for engine in OTHERS
+    ]
+
+
+def others(often: str) -> list[Any]:
+    """The engines without MuJoCo: one is slow, the other full."""
+    return [_tiered(engine, engine == often) for engine in OTHERS]
+
+
+def slow_alone(parameters: Iterable[Any]) -> list[Any]:
+    """Those parameters that are slow, without what only the full tier runs."""
+    return [one for one in parameters if pytest.mark.slow in one.marks]
+
+
+def _tiered(*values: Any) -> Any:
+    """A parameter of all values but the last, which says whether it is often run."""
+    return pytest.param(*values[:-1], marks=pytest.mark.slow if values[-1] else pytest.mark.full)

@@ -149,14 +149,14 @@ def test_a_killed_run_leaves_whole_trajectories_and_goes_on(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_sixteen_envs_succeed_and_replay_to_the_bit(tmp_path: Path) -> None:
-    arguments = ("run", "pick_cube", "-n", "16", "-k", "16", "-s", "1", "--min-success", "0.95", "--out", str(tmp_path))
+def test_eight_envs_succeed_and_replay_to_the_bit(tmp_path: Path) -> None:
+    arguments = ("run", "pick_cube", "-n", "8", "-k", "8", "-s", "1", "--min-success", "0.95", "--out", str(tmp_path))
     result = anysim(*arguments)
     assert result.returncode == 0, result.stdout + result.stderr
     replayed = anysim("replay", str(tmp_path), "--json")
     assert replayed.returncode == 0, replayed.stderr
     report = json.loads(replayed.stdout)
-    assert report["identical"] == report["replayed"] >= 15
+    assert report["identical"] == report["replayed"] == 8
 
 
 def test_audit_compares_every_number() -> None:

@@ -119,7 +119,7 @@ def test_answers_and_requests_that_cannot_be_met(code: int, words: list[str], tm
     [
         (0, ["doctor"]),
         (2, ["doctor", "--nothing-like-it"]),
-        (0, ["compare", "pick_cube", "--engines", "null"]),
+        (0, ["compare", "pick_cube", "--engines", "null", "--layers", "asset"]),
         (2, ["compare", "no_such_task"]),
         (2, ["compare", "pick_cube", "--engines", "warp_drive"]),
         (2, ["bench", "no_such_bench"]),

@@ -5,14 +5,13 @@ import pytest
 
 from anysim.api import compile_world, load
 from anysim.engine.factory import create_simulation
+from tests.tiers import by_turns
 
 ROBOTS = ("tiago", "tiago_dual", "tiago_pro", "pr2", "mobile_panda", "mobile_dual_panda", "mobile_ur5")
 SAG, MOVED = 0.05, 0.01  # [rad] or [m]; [m] of the base
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(("robot", "engine"), by_turns(ROBOTS))
 def test_it_stands(robot: str, engine: str) -> None:
     world = compile_world(
         load({"engine": engine, "world": {"name": "w", "terrain": "plane", "robots": {"r": {"robot": robot}}}})

@@ -1,5 +1,6 @@
 """Wheels, built once, and fresh environments that hold nothing but some of them and what these depend on."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -16,14 +17,20 @@ from packaging.utils import canonicalize_name, parse_wheel_filename
 
 ROOT = Path(__file__).parents[2]
 EXTERNAL = ROOT / "tests" / "external"
+MEMBERS = ("schemas", "core", "backends/*", "plugins/*", "tasks")
+"""The packages of the workspace, as the root's pyproject.toml has them."""
 
 
 def run(
     *command: str | Path, cwd: Path = ROOT, ok: bool = True, timeout: float = 900
 ) -> subprocess.CompletedProcess[str]:
-    """Run a program; one that fails fails the test with what it said, unless that is what the test is about."""
+    """Run a program; one that fails fails the test with what it said, unless that is what the test is about.
+
+    What Python compiles stays in the environments, or each program would compile all that it imports anew.
+    """
     words = [str(word) for word in command]
-    done = subprocess.run(words, cwd=cwd, capture_output=True, text=True, timeout=timeout, check=False)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    done = subprocess.run(words, cwd=cwd, capture_output=True, text=True, timeout=timeout, check=False, env=environment)
     assert done.returncode == 0 or not ok, f"{' '.join(words)}\n{done.stdout[-8000:]}\n{done.stderr[-4000:]}"
     return done
 
@@ -38,7 +45,9 @@ def program() -> Callable[..., subprocess.CompletedProcess[str]]:
 def wheels(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Wheels of all members, each built from its source distribution."""
     out = tmp_path_factory.mktemp("dist")
-    run(find_uv(ROOT), "build", "--quiet", "--all-packages", "--out-dir", out)
+    members = [path.parent for pattern in MEMBERS for path in sorted(ROOT.glob(f"{pattern}/pyproject.toml"))]
+    python = (find_uv(ROOT), "run", "--quiet", "--no-project", "--isolated", "--with", "hatchling>=1.27")
+    run(*python, "--python", sys.executable, "python", Path(__file__).with_name("build_members.py"), out, *members)
     return sorted(out.glob("*.whl"))
 
 

@@ -11,6 +11,7 @@ from lock import find_uv
 
 from anysim.testing.engines import require_engine
 from tests.external_packages import FOUND, offered
+from tests.tiers import in_turn
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
 
@@ -86,8 +87,7 @@ def test_all_that_the_package_of_the_guides_offers_is_found_and_loads(python: Pa
     assert json.loads(found) == offered("anysim-starter")
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("task", ["pick_cube", "own.yaml", "touch_shelf"])
+@pytest.mark.parametrize(("task", "engine"), in_turn(["pick_cube", "own.yaml", "touch_shelf"]))
 def test_a_task_runs_and_is_recorded(task: str, engine: str, python: Path, program: Any, folder: Path) -> None:
     require_engine(engine)
     out = folder / f"{Path(task).stem}-{engine}"

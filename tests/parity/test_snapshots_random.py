@@ -14,7 +14,7 @@ from anysim.testing.compare import MOTION
 from anysim.testing.engines import require_engine
 from tests.parity import random_scenes as scenes
 
-COUNTS = [pytest.param(25, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.full)]
+COUNTS = [pytest.param(15, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.full)]
 BEFORE, LONGEST_FALL, AFTER = 15, 60, 10
 """Rounds of new commands, of 1 to 4 physics steps each."""
 

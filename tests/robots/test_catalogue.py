@@ -16,7 +16,7 @@ from anysim.model.world import World
 from anysim_robots.qualify.result import Check
 from anysim_robots.qualify.run import FULL, Durations, qualify
 from anysim_robots.qualify.stage import NAME, controllers, stage
-from tests.tiers import by_turns
+from tests.tiers import in_turn
 
 ROBOTS = [n for n in registry.names("robots") if registry.distribution("robots", n) == "anysim-robots"]
 ENGINES = ("mujoco", "pybullet", "sapien")
@@ -131,7 +131,7 @@ def qualified(name: str, engine: str) -> dict[str, Check]:
     return {check.name: check for check in qualify(name, engine, durations).checks}
 
 
-@pytest.mark.parametrize(("name", "engine"), by_turns(ROBOTS))
+@pytest.mark.parametrize(("name", "engine"), in_turn(ROBOTS))
 def test_it_qualifies_on_the_engine(name: str, engine: str) -> None:
     """Every check passes but those of `MISSES`, and none of those has become worse."""
     for check in qualified(name, engine).values():

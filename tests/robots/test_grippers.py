@@ -16,6 +16,7 @@ from anysim.planning.api import inverse_kinematics
 from anysim.testing.engines import require_engine
 from anysim.testing.tracking import bolted
 from anysim_schemas.run import RunSpec
+from tests.tiers import in_turn
 
 
 class Task(NamedTuple):
@@ -68,9 +69,7 @@ SLIP = 0.01
 """[m] that the cube may move in the hand from the end of the grip to the end of the hold."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
-@pytest.mark.parametrize("hand", TASKS)
+@pytest.mark.parametrize(("hand", "engine"), in_turn(TASKS))
 def test_a_gripper_lifts_a_cube(hand: str, engine: str) -> None:
     require_engine(engine)
     robot, task = hand.split()[0], TASKS[hand]

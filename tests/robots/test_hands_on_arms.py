@@ -13,8 +13,8 @@ from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
 from anysim.testing.tracking import bolted, robot_world
+from tests.tiers import by_turns
 
-ENGINES = ("mujoco", "pybullet", "sapien")
 CONTROL_DT = 0.02
 PHYSICS = {"control_dt": CONTROL_DT, "impratio": 10.0}
 """MuJoCo's friction creeps by what presses sideways over the mass of what it presses on; ten times less like this.
@@ -141,9 +141,7 @@ def scene(grip: Grip) -> dict[str, Any]:
     }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("robot", GRIPS)
+@pytest.mark.parametrize(("robot", "engine"), by_turns(GRIPS))
 def test_the_hands_of_a_robot_hold_cylinders_for_three_seconds(robot: str, engine: str) -> None:
     """What is allowed is a sixth of the diameter in the palm's frame. Open hands let go of all, in the same places."""
     grip = GRIPS[robot]

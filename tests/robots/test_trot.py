@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 
 from anysim.testing.quadrupeds import QUADRUPEDS, WITH_ARM, made, stand, walk
+from tests.tiers import by_turns
 
-ENGINES = ("mujoco", "pybullet", "sapien")
 SPEED = {"unitree_go1": 0.5, "unitree_go2": 0.5, "unitree_b1": 0.5, "anymal_b": 0.5, "solo12": 0.3}
 """[m/s] forward, of five robots that differ in size, knees and feet; half of it to the side."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("robot", SPEED)
+@pytest.mark.parametrize(("robot", "engine"), by_turns(SPEED))
 def test_trots_sidesteps_and_turns(robot: str, engine: str) -> None:
     forward = SPEED[robot]
     commands = np.array([[forward, 0.0, 0.0], [0.0, 0.5 * forward, 0.0], [0.0, 0.0, 0.6]])

@@ -13,7 +13,7 @@ from tests.runtime import light
 from tests.runtime.model import Alone, Row, action, check
 
 N = 3
-COUNTS = [pytest.param(200, marks=pytest.mark.slow), pytest.param(1000, marks=pytest.mark.full)]
+COUNTS = [pytest.param(100, marks=pytest.mark.slow), pytest.param(1000, marks=pytest.mark.full)]
 """Random programs on each engine."""
 masks = st.lists(st.booleans(), min_size=N, max_size=N)
 slots = st.lists(st.integers(0, N - 1), min_size=1, max_size=N, unique=True)

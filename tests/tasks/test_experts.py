@@ -7,7 +7,7 @@ from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_pick import rollout
 from tests.tasks.states import blind, blinding
-from tests.tiers import by_turns
+from tests.tiers import ENGINES, by_turns, slow_alone
 
 TASKS = [
     "reach",
@@ -83,7 +83,7 @@ TASKS = [
 LONG = {"cowork_place", "lab_vial", "mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
 """Episodes of many commands: on MuJoCo in the slow tier, on the others before a release."""
 LEAST = {"cowork_place": 5, "wipe_arm": 3, "put_away": 6, "rope_straighten": 4, "go1_velocity": 6}
-"""Of eight; where nothing is said seven."""
+"""Of eight; where nothing is said seven, and three of the four that are tried often."""
 
 
 @pytest.mark.parametrize("robot", ["ur5_gripper", pytest.param("xarm7_gripper", marks=pytest.mark.slow)])
@@ -99,11 +99,34 @@ def test_another_robot_solves_the_task(task: str, robot: str) -> None:
     assert words.count("success") == 4, words
 
 
-@pytest.mark.parametrize(("task", "engine"), by_turns(TASKS, LONG))
-def test_the_expert_solves_the_task(task: str, engine: str) -> None:
+def solved(task: str, engine: str, episodes: int) -> int:
+    """How many of the first episodes of the seed end well."""
     require_engine(engine)
-    with blind(task, engine, 8) as env:
+    with blind(task, engine, episodes) as env:
         assert env.spec.task is not None
         env.reset(seed=4001)
         words = rollout(env, SkillPolicy(env), env.spec.task.horizon)
-    assert words.count("success") >= LEAST.get(task, 7), words
+    print(task, engine, words)
+    return words.count("success")
+
+
+@pytest.mark.parametrize(("task", "engine"), slow_alone(by_turns(TASKS, LONG)))
+def test_the_expert_solves_the_task(task: str, engine: str) -> None:
+    """Four episodes; eight of what fails too often for four to tell."""
+    least = LEAST.get(task)
+    assert solved(task, engine, 8 if least else 4) >= (least or 3)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("task", [task for task in TASKS if task not in LEAST])
+def test_the_expert_solves_seven_of_eight(task: str, engine: str) -> None:
+    assert solved(task, engine, 8) >= 7
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("task", "engine"), [one.values for one in by_turns(LEAST, LONG) if pytest.mark.full in one.marks]
+)
+def test_the_expert_solves_what_is_hard_elsewhere(task: str, engine: str) -> None:
+    assert solved(task, engine, 8) >= LEAST[task]

@@ -147,7 +147,8 @@ class Particles(CoSolver):
             turns[:, :k][free] = np.linalg.inv(bodies.inertia[free])
         com, twist = np.zeros((n, k + 1, 3)), np.zeros((n, k + 1, 6))
         com[:, :k], twist[:, :k] = bodies.com, bodies.twist
-        friction = bodies.friction[:, self.scene.geoms.number]
+        # rows of their own: kernels are compiled for each layout
+        friction = np.ascontiguousarray(bodies.friction[:, self.scene.geoms.number])
 
         def one(row: int) -> None:
             env = int(env_ids[row])

@@ -9,7 +9,7 @@ import anysim
 from anysim.engine.state import SnapshotLevel
 from anysim_pybullet import client
 
-ROUGH = "{kind: rough, amplitude: 0.02, size: [5.0, 5.0], cell: 0.1, friction: 0.8}"
+ROUGH = "{kind: rough, amplitude: 0.02, size: [3.0, 3.0], cell: 0.1, friction: 0.8}"
 CASES = {
     "go1_velocity": [],
     "pick_cube": ["world.objects.cube.com_offset={range: [[-0.005, -0.005, -0.005], [0.005, 0.005, 0.005]]}"],
@@ -34,7 +34,7 @@ def run(task: str, monkeypatch: pytest.MonkeyPatch, kept: int) -> tuple[list[Any
     with anysim.make(task, engine="pybullet", num_envs=2, overrides=overrides) as env:
         for seed in range(3):
             env.reset(seed=seed)
-            for _ in range(25):
+            for _ in range(15):
                 env.step(draws.uniform(-0.3, 0.3, (2, env.action_dim)), env.running)
             state = env.engine.get_state()
             states.append((state.body_pose, state.body_twist, state.joint_pos, state.joint_vel, state.contact_force))

@@ -8,12 +8,14 @@ from anysim.engine.capability import Capability
 from anysim.engine.factory import runnable
 from anysim.errors import AssetError
 from anysim.model.world import World
+from anysim.testing.engines import require_engine
 from anysim_banks.gripper import Gripper, gripper
 from anysim_banks.making import Order, made, tried_on
 from anysim_banks.method import Grasps
 from anysim_banks.sampling import Candidates, sample, tool_turn
 from anysim_banks.subject import subjects
 from anysim_banks.trial import CREEP, HARDEST, Trial
+from tests.tiers import others_in_turn
 
 DOWN = [1.0, 0.0, 0.0, 0.0]
 ENGINES = runnable(Capability.WRENCHES)
@@ -93,21 +95,21 @@ def test_a_thing_too_wide_says_so(hand: Gripper) -> None:
         made(Grasps(subjects(world, "crate")[0], hand), "mujoco", Order(20, 4), print)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("source", "affordance"),
-    [({"box": [0.04, 0.06, 0.1]}, "body"), ({"cylinder": [0.03, 0.12]}, "body"), ("procedural:mug", "handle")],
+    ("source", "affordance", "engine"),
+    others_in_turn(
+        [{"box": [0.04, 0.06, 0.1]}, {"cylinder": [0.03, 0.12]}, "procedural:mug"], ["body", "body", "handle"]
+    ),
 )
 def test_most_of_what_mujoco_keeps_is_held_on_the_other_engines(
-    hand: Gripper, source: dict[str, object] | str, affordance: str
+    hand: Gripper, source: dict[str, object] | str, affordance: str, engine: str
 ) -> None:
+    require_engine(engine)
     world = compile_world({"world": {"objects": {"thing": {"source": source}}}})
     [thing] = subjects(world, "thing", affordance)
     bank, _ = made(Grasps(thing, hand), "mujoco", Order(300, 32), print)
-    others = [e for e in ("pybullet", "sapien") if e in ENGINES]
-    bank = tried_on(bank, Grasps(thing, hand), others, print)
-    for engine in others:
-        assert bank.passed_on(engine).mean() >= 0.9
+    bank = tried_on(bank, Grasps(thing, hand), [engine], print)
+    assert bank.passed_on(engine).mean() >= 0.9
 
 
 def test_a_thin_bar_far_from_the_weight_turns_in_the_fingers_slowly(hand: Gripper) -> None:

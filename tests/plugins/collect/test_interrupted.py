@@ -18,7 +18,7 @@ from tests.plugins.sharded.shards_help import gone
 
 WORLDS = Path(__file__).parents[1] / "skills/worlds"
 EPISODES = 8
-KILLS = 3
+KILLS = 2
 
 
 def command(world: str, episodes: int, out: Path, *words: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Exports that are killed at a dozen moments and go on to the same bytes, and disks that are full."""
+"""Exports that are killed at six or twelve moments and go on to the same bytes, and disks that are full."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ from anysim import registry
 from anysim.errors import RecordError
 from anysim_export.job import export
 run, form, folder = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
-options = json.loads(sys.argv[4])
+options, moments = json.loads(sys.argv[4]), int(sys.argv[5])
 for module in registry.load("exporters", form).needs:
     importlib.import_module(module)
 def content(directory):
@@ -71,7 +71,7 @@ code, said = child(folder / "whole", -1)
 assert code == 0, code
 total = json.loads(said)[0]
 wanted, found = content(folder / "whole"), []
-for moment in sorted({1 + round(i * (total - 2) / 11) for i in range(12)}):
+for moment in sorted({1 + round(i * (total - 2) / (moments - 1)) for i in range(moments)}):
     out = folder / f"killed_{moment}"
     code, _ = child(out, moment)
     assert code == -signal.SIGKILL, (moment, code)
@@ -94,24 +94,25 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(tmp_path_factory.mktemp("recorded") / "run", 3, "task.horizon=15", "record.keep=all")
 
 
-def program(text: str, run: Path, form: str, folder: Path) -> subprocess.CompletedProcess[str]:
+def program(text: str, run: Path, form: str, folder: Path, moments: int = 10) -> subprocess.CompletedProcess[str]:
     """Run it."""
-    words = [sys.executable, "-c", text, str(run), form, str(folder), json.dumps(OPTIONS.get(form, {}))]
+    words = [sys.executable, "-c", text, str(run), form, str(folder), json.dumps(OPTIONS.get(form, {})), str(moments)]
     return subprocess.run(words, capture_output=True, text=True, timeout=580, check=False)
 
 
+@pytest.mark.parametrize("moments", [6, pytest.param(12, marks=pytest.mark.full)])
 @pytest.mark.parametrize("form", FORMS)
-def test_killed_at_a_dozen_moments_it_goes_on_to_the_same_bytes(short: Path, tmp_path: Path, form: str) -> None:
-    done = program(KILLED, short, form, tmp_path)
+def test_killed_at_some_moments_it_goes_on_to_the_same_bytes(
+    short: Path, tmp_path: Path, form: str, moments: int
+) -> None:
+    done = program(KILLED, short, form, tmp_path, moments)
     assert done.returncode == 0, done.stderr[-2000:]
     found = json.loads(done.stdout.splitlines()[-1])
-    assert len(found) == 12
+    assert len(found) == moments
     assert found[0][0] == 0
-    assert len({resumed for resumed, _, there in found if not there}) >= 3  # it died in several episodes
-    assert any(begun for _, begun, _ in found) or form in (
-        "webdataset",
-        "coco",
-        "foxglove",
+    assert len({resumed for resumed, _, there in found if not there}) >= moments // 4  # it died in several episodes
+    assert (
+        moments < 12 or any(begun for _, begun, _ in found) or form in ("webdataset", "coco", "foxglove")
     )  # and while they were put together
 
 
@@ -123,7 +124,7 @@ written(folder.parent / "whole")
 wanted = content(folder.parent / "whole")
 largest, total = max(map(len, wanted.values())), sum(map(len, wanted.values()))
 failed, sentences = 0, set()
-for moment in range(1, 11):
+for moment in range(1, moments + 1):
     out = folder / f"full_{moment}"
     restrict(moment, largest, total)
     try:

@@ -135,10 +135,11 @@ def quiet(tmp_path_factory: pytest.TempPathFactory, env: TaskEnv) -> Path:
     return out
 
 
-def test_kill_at_twenty_moments(quiet: Path, env: TaskEnv, tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [8, pytest.param(20, marks=pytest.mark.full)])
+def test_kill_at_many_moments(quiet: Path, env: TaskEnv, tmp_path: Path, count: int) -> None:
     total = int(run(DYING, tmp_path / "counted", "count"))
-    moments = sorted({2 + round(i * (total - 8) / 19) for i in range(20)})
-    assert len(moments) == 20
+    moments = sorted({2 + round(i * (total - 8) / (count - 1)) for i in range(count)})
+    assert len(moments) == count
     (tmp_path / "killed").mkdir()
     run(DYING, tmp_path / "killed", *moments)
     found, orphans = [], 0

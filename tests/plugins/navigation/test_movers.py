@@ -16,6 +16,7 @@ from anysim.testing.engines import require_engine
 from anysim_navigation.base_planner import PlannedBase
 from anysim_navigation.drive_bench import HARD, drive
 from anysim_navigation.movers import Movers, movers_of
+from tests.tiers import others
 
 BALL = {"source": {"box": [0.4, 0.4, 0.4]}}
 WORLD: dict[str, Any] = {
@@ -135,8 +136,7 @@ def test_a_drive_among_people_goes_on_from_a_snapshot_bit_for_bit() -> None:
         assert not np.array_equal(first, gone(env, policy, 40)[0])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+@pytest.mark.parametrize("engine", [*others("pybullet"), pytest.param("mujoco", marks=pytest.mark.full)])
 def test_a_room_is_crossed_among_four_people(engine: str) -> None:
     require_engine(engine)
     found = drive(1, "holonomic_base", engine, people=4)

@@ -69,8 +69,17 @@ def test_recordings_replay_and_stream_points(engine, tmp_path: Path):
         assert replay(folder).identical
 
 
-@pytest.mark.parametrize("kind", ["fluid", pytest.param("sand", marks=pytest.mark.slow)])
-@EACH
+@pytest.mark.parametrize(
+    ("engine", "kind"),
+    [
+        ("mujoco", "fluid"),
+        *(pytest.param(*row, marks=pytest.mark.slow) for row in (("pybullet", "fluid"), ("sapien", "sand"))),
+        *(
+            pytest.param(*row, marks=pytest.mark.full)
+            for row in (("mujoco", "sand"), ("pybullet", "sand"), ("sapien", "fluid"))
+        ),
+    ],
+)
 def test_the_suite_clears_it(engine, kind, tmp_path: Path):
     """Matter that falls onto a ball: snapshots, partial resets and steps, and what is lost, as the suite has it."""
     require_engine(engine)

@@ -8,6 +8,7 @@ from anysim.skills.base import Outcome
 from anysim.skills.runner import SkillPolicy
 from tests.plugins.skills.test_honest_failures import given_up
 from tests.plugins.skills.test_manipulation import WORLDS, solved
+from tests.tiers import others_in_turn
 
 COMPOSED = ["tidy", "stack_two", "lift_and_regrasp", "unplug", "place_near"]
 
@@ -17,9 +18,7 @@ def test_it_is_solved_on_mujoco(world: str) -> None:
     assert solved(world, "mujoco", 2) == 1.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
-@pytest.mark.parametrize("world", COMPOSED)
+@pytest.mark.parametrize(("world", "engine"), others_in_turn(COMPOSED))
 def test_it_is_solved_on_the_other_engines(world: str, engine: str) -> None:
     assert solved(world, engine, 4) >= 0.75
 

@@ -8,6 +8,7 @@ from anysim import make
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_pick import rollout
+from tests.tiers import others_in_turn
 
 WORLDS = Path(__file__).parent / "worlds"
 STEPS = 1000
@@ -26,9 +27,7 @@ def test_it_is_solved_on_mujoco(world: str) -> None:
     assert solved(world, "mujoco", 4) == 1.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
-@pytest.mark.parametrize("world", ["stack", "push", "open_drawer", "close_drawer"])
+@pytest.mark.parametrize(("world", "engine"), others_in_turn(["stack", "push", "open_drawer", "close_drawer"]))
 def test_it_is_solved_on_the_other_engines(world: str, engine: str) -> None:
     assert solved(world, engine, 4) >= 0.75
 

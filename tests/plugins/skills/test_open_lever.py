@@ -8,6 +8,7 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_manipulation import WORLDS, solved
+from tests.tiers import others
 
 WORLD = "open_lever_door"
 
@@ -16,8 +17,7 @@ def test_a_latched_door_is_opened_by_its_lever() -> None:
     assert solved(WORLD, "mujoco", 4) == 1.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+@pytest.mark.parametrize("engine", others("pybullet"))
 def test_it_is_opened_on_the_other_engines(engine: str) -> None:
     assert solved(WORLD, engine, 4) >= 0.75
 

@@ -9,6 +9,7 @@ from anysim import make
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
+from tests.tiers import others_in_turn
 
 WORLD = Path(__file__).parent / "worlds/parts_behind_wall.yaml"
 SKILLS = {
@@ -42,9 +43,7 @@ def test_what_is_behind_a_wall_is_reached_with_a_planner_and_held_up_without(ski
     assert (Outcome.OK, 1) not in ended(skill, "", "mujoco")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("skill", SKILLS)
-@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+@pytest.mark.parametrize(("skill", "engine"), others_in_turn(SKILLS))
 def test_it_is_reached_on_the_other_engines(engine: str, skill: str) -> None:
     require_engine(engine)
     assert [outcome for outcome, _ in ended(skill, "rrt", engine)] == [Outcome.OK] * 2

@@ -24,6 +24,7 @@ from anysim_skills import planned_moves
 from anysim_skills.arm import Arm
 from anysim_skills.planning import WORKERS_VARIABLE, planner_of
 from tests.plugins.skills.test_pick import rollout
+from tests.tiers import others
 
 WALL = Path(__file__).parent / "worlds/behind_wall.yaml"
 STEPS = 1000
@@ -43,8 +44,7 @@ def test_what_is_behind_a_wall_is_fetched_with_a_planner_and_not_without() -> No
             assert ("planner" in policy.describe(0)) == bool(planner)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+@pytest.mark.parametrize("engine", others("sapien"))
 def test_it_is_fetched_on_the_other_engines(engine: str) -> None:
     require_engine(engine)
     with behind_wall(engine=engine, num_envs=4) as env:

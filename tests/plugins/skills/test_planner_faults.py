@@ -55,9 +55,17 @@ def collected(out: Path, monkeypatch: pytest.MonkeyPatch, fault: str, service: s
     return hit, sorted(results, key=lambda result: result.env)
 
 
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> list[EpisodeResult]:
+    """The episodes without any fault, which are the same with every service."""
+    require_engine("mujoco")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        return collected(tmp_path_factory.mktemp("calm"), monkeypatch, "", "threads")[1]
+
+
 @pytest.mark.parametrize(("fault", "service", "outcome"), CASES)
 def test_an_episode_fails_with_its_type_and_the_others_go_on(
-    fault: str, service: str, outcome: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fault: str, service: str, outcome: str, calm: list[EpisodeResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     require_engine("mujoco")
     if fault == "hangs":
@@ -74,6 +82,5 @@ def test_an_episode_fails_with_its_type_and_the_others_go_on(
     while threading.active_count() > threads and time.perf_counter() < end:
         time.sleep(0.01)
     assert (threading.active_count(), children()) == (threads, processes)
-    _, calm = collected(tmp_path / "calm", monkeypatch, "", service)
     same = [(a.steps, a.outcome) == (b.steps, b.outcome) for a, b in zip(results, calm, strict=True)]
     assert [env for env in range(ENVS) if not same[env]] == ([] if outcome == "ok" else [hit])

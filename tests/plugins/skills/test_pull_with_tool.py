@@ -10,6 +10,7 @@ from anysim.math import pose as P
 from anysim.skills.base import Outcome
 from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_navigate import driven
+from tests.tiers import others
 
 WORLD = Path(__file__).parent / "worlds/pull_with_tool.yaml"
 NUM_ENVS = 4
@@ -31,8 +32,7 @@ def test_a_cube_is_drawn_to_the_goal_with_a_hook() -> None:
     assert (off < 0.045).all()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+@pytest.mark.parametrize("engine", others("sapien"))
 def test_it_is_drawn_on_the_other_engines(engine: str) -> None:
     outcomes, off = pulled(engine)
     assert outcomes.count(Outcome.OK) >= 3

@@ -9,6 +9,7 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_manipulation import WORLDS
+from tests.tiers import others
 
 WIDTH = 0.05
 SIZE = np.array([0.15, 0.11])
@@ -46,8 +47,7 @@ def test_a_patch_is_wiped_on_mujoco() -> None:
     assert forces.max() < 40.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+@pytest.mark.parametrize("engine", others("pybullet"))
 def test_a_patch_is_wiped_on_the_other_engines(engine: str) -> None:
     outcomes, covered, forces = wiped(engine, 4)
     assert outcomes.count(Outcome.OK) >= 3

@@ -5,4 +5,8 @@ from functools import partial
 from anysim.math.compiled import compiled as in_numba
 
 compiled = partial(in_numba, nogil=True, error_model="numpy")
-"""Compile on first use, and keep the machine code; what divides by zero becomes inf or NaN, and so a fault."""
+"""Compile on first use, and keep the machine code; what divides by zero becomes inf or NaN, and so a fault.
+
+Arrays are filled and copied number by number: a slice or an index array takes numba a second to compile, for what it
+would say of other shapes.
+"""

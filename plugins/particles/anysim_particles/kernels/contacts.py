@@ -179,8 +179,10 @@ def _more(c: Contacts) -> Contacts:
     slot, gap = np.empty(2 * size, dtype=np.int32), np.empty(2 * size)
     normal, place = np.empty((2 * size, 3)), np.empty((2 * size, 3))
     friction, share = np.empty(2 * size), np.empty(2 * size)
-    slot[:size], gap[:size], normal[:size], place[:size] = c.slot, c.gap, c.normal, c.place
-    friction[:size], share[:size] = c.friction, c.share
+    for i in range(size):
+        slot[i], gap[i], friction[i], share[i] = c.slot[i], c.gap[i], c.friction[i], c.share[i]
+        for k in range(3):
+            normal[i, k], place[i, k] = c.normal[i, k], c.place[i, k]
     return Contacts(c.begin, slot, gap, normal, place, friction, share)
 
 

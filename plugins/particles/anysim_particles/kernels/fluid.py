@@ -22,7 +22,7 @@ from anysim_particles.kernels.contacts import (
     weigh,
     yields,
 )
-from anysim_particles.kernels.pairs import near_pairs, sorted_by_cell
+from anysim_particles.kernels.pairs import in_order, near_pairs, put_back, sorted_by_cell
 from anysim_sensors.tables import Geoms, Triangles
 
 REACH = 2.0
@@ -81,7 +81,7 @@ def fluid_step(
         drag: share of the velocity along a surface that goes in a substep.
     """
     order = sorted_by_cell(x_, n, REACH * spacing)
-    x, v = x_[order], v_[order]
+    x, v = in_order(x_, order), in_order(v_, order)
     h, reach = dt / substeps, REACH * spacing
     still = b.com.shape[0] - 1
     p, near = np.empty((n, 3)), no_contacts(n)
@@ -103,7 +103,9 @@ def fluid_step(
         some = near.begin[n]
         shares, slopes = np.empty(some), np.empty(some)
         for _ in range(iterations):
-            density[:], square[:], along[:] = 1.0, 0.0, 0.0
+            for i in range(n):
+                density[i], square[i] = 1.0, 0.0
+                along[i, 0] = along[i, 1] = along[i, 2] = 0.0
             for q in range(count):
                 i, j = pairs[q, 0], pairs[q, 1]
                 e, f, g = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
@@ -176,7 +178,8 @@ def fluid_step(
             for k in range(3):
                 v[i, k] = (p[i, k] - x[i, k]) / h
         # velocities of neighbours come nearer to each other; what is between two is the same for both
-        along[:] = 0.0
+        for i in range(n):
+            along[i, 0] = along[i, 1] = along[i, 2] = 0.0
         for q in range(count):
             i, j = pairs[q, 0], pairs[q, 1]
             e, f, g = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
@@ -212,4 +215,5 @@ def fluid_step(
                 x[i, k] = p[i, k]
     for k in range(6):
         received[k] -= b.impulse[still, k]
-    x_[order], v_[order] = x, v
+    put_back(x_, order, x)
+    put_back(v_, order, v)

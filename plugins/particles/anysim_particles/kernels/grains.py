@@ -22,7 +22,7 @@ from anysim_particles.kernels.contacts import (
     weigh,
     yields,
 )
-from anysim_particles.kernels.pairs import near_pairs, sorted_by_cell
+from anysim_particles.kernels.pairs import in_order, near_pairs, put_back, sorted_by_cell
 from anysim_sensors.tables import Geoms, Triangles
 
 
@@ -72,16 +72,19 @@ def grain_step(
         slow: [m/s] at which what overlaps comes apart.
     """
     grains = n // beads
-    first = x_[:n:beads].copy()
+    first = np.empty((grains, 3))
+    for a in range(grains):
+        for k in range(3):
+            first[a, k] = x_[a * beads, k]
     by_grain = sorted_by_cell(first, grains, 4 * radius)
     order = np.empty(n, dtype=np.int64)
     for a in range(grains):
         for k in range(beads):
             order[a * beads + k] = by_grain[a] * beads + k
-    x, v = x_[order], v_[order]
+    x, v = in_order(x_, order), in_order(v_, order)
     h = dt / substeps
     still = b.com.shape[0] - 1
-    p, near = x.copy(), no_contacts(n)
+    p, near = in_order(x_, order), no_contacts(n)
     pairs, count = np.empty((8 * n + 64, 2), dtype=np.int32), 0
     load, touched, rubbed, dragged = np.empty(1), np.empty(1), np.empty(1), np.empty(1)
     skin, used = 0.0, np.inf
@@ -104,8 +107,10 @@ def grain_step(
             touched, dragged = np.empty(2 * some), np.empty(2 * some)
         if load.shape[0] < count:
             load, rubbed = np.empty(pairs.shape[0]), np.empty(pairs.shape[0])
-        load[:count], rubbed[:count] = 0.0, 0.0
-        touched[:some], dragged[:some] = 0.0, 0.0
+        for q in range(count):
+            load[q] = rubbed[q] = 0.0
+        for c in range(some):
+            touched[c] = dragged[c] = 0.0
         for _ in range(iterations):
             for q in range(count):
                 i, j = pairs[q, 0], pairs[q, 1]
@@ -178,7 +183,8 @@ def grain_step(
                 x[i, k] = p[i, k]
     for k in range(6):
         received[k] -= b.impulse[still, k]
-    x_[order], v_[order] = x, v
+    put_back(x_, order, x)
+    put_back(v_, order, v)
 
 
 @compiled

@@ -47,7 +47,8 @@ def pack(tried: Array, low: Array, high: Array, diameter: float, packed: Array, 
                         free = free and away >= diameter * diameter
         if free:
             home[at[0] + sides[0] * (at[1] + sides[1] * at[2])] = done
-            packed[done] = tried[t]
+            for c in range(3):
+                packed[done, c] = tried[t, c]
             done += 1
     return done
 

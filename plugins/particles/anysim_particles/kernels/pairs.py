@@ -38,14 +38,17 @@ def _place(p: Array, n: int, cell: float, low: Array, at: Array) -> None:
 @compiled
 def _start(at: Array, n: int, sides: Array, home: Array, begin: Array, order: Array) -> None:
     """Sort particles by cell: those of cell c are order[begin[c]:begin[c + 1]]."""
-    begin[:] = 0
+    for c in range(begin.shape[0]):
+        begin[c] = 0
     for i in range(n):
         c = at[i, 0] % sides[0] + sides[0] * (at[i, 1] % sides[1] + sides[1] * (at[i, 2] % sides[2]))
         home[i] = c
         begin[c + 1] += 1
     for c in range(begin.shape[0] - 1):
         begin[c + 1] += begin[c]
-    fill = begin[:-1].copy()
+    fill = np.empty(begin.shape[0], dtype=np.int64)
+    for c in range(begin.shape[0]):
+        fill[c] = begin[c]
     for i in range(n):
         order[fill[home[i]]] = i
         fill[home[i]] += 1
@@ -65,9 +68,28 @@ def sorted_by_cell(p: Array, n: int, cell: float) -> Array:
 
 
 @compiled
+def in_order(rows: Array, order: Array) -> Array:
+    """The chosen rows (n, 3), copied."""
+    chosen = np.empty((order.shape[0], 3))
+    for i in range(order.shape[0]):
+        for k in range(3):
+            chosen[i, k] = rows[order[i], k]
+    return chosen
+
+
+@compiled
+def put_back(rows: Array, order: Array, chosen: Array) -> None:
+    """Write the chosen rows (n, 3) to where they came from."""
+    for i in range(order.shape[0]):
+        for k in range(3):
+            rows[order[i], k] = chosen[i, k]
+
+
+@compiled
 def _grown(pairs: Array) -> Array:
     more = np.empty((2 * pairs.shape[0], 2), dtype=np.int32)
-    more[: pairs.shape[0]] = pairs
+    for q in range(pairs.shape[0]):
+        more[q, 0], more[q, 1] = pairs[q, 0], pairs[q, 1]
     return more
 
 

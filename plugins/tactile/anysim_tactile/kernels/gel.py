@@ -35,10 +35,14 @@ def bulge(deep: Array, weights: Array, height: Array) -> None:
         weights: (L, K) of blurs, from wide to narrow.
         height: (N, H, W) written.
     """
-    aside = np.empty(deep.shape[1:])
+    aside = np.empty((deep.shape[1], deep.shape[2]))
     for e in range(deep.shape[0]):
-        height[e] = deep[e]
-        if not deep[e].max() > 0.0:
+        deepest = 0.0
+        for v in range(deep.shape[1]):  # number by number: a slice takes numba a second to compile
+            for u in range(deep.shape[2]):
+                height[e, v, u] = deep[e, v, u]
+                deepest = max(deepest, deep[e, v, u])
+        if not deepest > 0.0:
             continue
         for level in range(weights.shape[0]):
             _blur(height[e], aside, weights[level])
