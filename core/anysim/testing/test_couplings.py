@@ -12,6 +12,8 @@ from anysim.testing import coupled, tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio
 from anysim.testing.fixtures import needs
 
+pytestmark = needs(C.DYNAMICS)
+
 G = coupled.G
 
 

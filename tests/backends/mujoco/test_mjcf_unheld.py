@@ -90,6 +90,11 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
         ("rest", '<actuator><position joint="turn" kp="1" delay="0.1" nsample="9"/></actuator>', "actuator delay: 0.1"),
         ("rest", '<equality><joint joint1="grip" active="false"/></equality>', "equality active: is inactive"),
         ("rest", '<equality><joint joint1="grip" joint2="turn" solref="0.1 1"/></equality>', "equality solref: 0.1 1"),
+        (
+            "rest",
+            '<equality><weld body1="arm" body2="base" torquescale="0.5"/></equality>',
+            "equality data: the torquescale of 0.5 is left out",
+        ),
         ("world", '<site name="goal"/>', "world: 1 sites of the world beside the model are left out"),
         ("base", 'mocap="true"', "body mocap: True is left out: it stays where it is"),
         ("rest", '<custom><numeric name="n" data="1"/></custom>', "numerics: are left out"),

@@ -101,7 +101,8 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_IDLE, "material rgba width", "it is of how a tendon is drawn"),
     ),
     "equality": (
-        Row(_EXACT, "name1 name2 data"),
+        Row(_EXACT, "name1 name2"),
+        Row(_ABOUT, "data", "all but the `torquescale` of a weld"),
         Row(_ABOUT, "type objtype", "those of joints and of tendons of two joints become mimic joints"),
         Row(_ABOUT, "active", "one that is not is left out"),
         Row(_ABOUT, "solref", "the time constant of a connect or weld; followers are as stiff as the engine has them"),

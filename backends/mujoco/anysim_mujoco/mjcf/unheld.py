@@ -34,6 +34,7 @@ PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
     ("tendon", "damping"): lambda tendon: _polynomial(tendon, "damping"),
     ("tendon", "stiffness"): lambda tendon: _polynomial(tendon, "stiffness"),
     ("tendon", "solref_limit"): lambda tendon: _solref(tendon.solref_limit),
+    ("equality", "data"): lambda tie: _torque(tie),
     ("equality", "solref"): lambda tie: _held(tie),
     ("equality", "active"): lambda tie: "" if tie.active else "is inactive, and left out",
     ("key", "qpos"): lambda key: "" if key.name == "home" else "are not kept: only the keyframe 'home' is",
@@ -215,6 +216,12 @@ def _solref(value: Any) -> str:
     if value[0] <= 0:
         return f"{value[0]:g} {value[1]:g} is a stiffness and a damping, and left out"
     return "" if value[1] == 1.0 else f"the damping ratio of {value[1]:g} is left out"
+
+
+def _torque(tie: Any) -> str:
+    scale = float(tie.data[10])
+    welds = tie.type == mujoco.mjtEq.mjEQ_WELD
+    return f"the torquescale of {scale:g} is left out" if welds and scale != 1.0 else ""
 
 
 def _held(tie: Any) -> str:
