@@ -31,8 +31,7 @@ from anysim.conventions import Array
 from anysim.engine.factory import create_simulation
 from anysim.errors import AnysimError
 from anysim.model.world import Actuator, BodyKind, ControlMode, World
-from anysim_mujoco.mjcf.load import VIRTUAL_SHARE
-from anysim_mujoco.mjcf.unheld import tendon_effects
+from anysim_mujoco.mjcf.unheld import is_fixed, tendon_effects
 
 STEPS = 100
 
@@ -74,7 +73,7 @@ class Raw:
         self.joints = [j for j in every if j not in self.free]
         self.q, self.v = model.jnt_qposadr[self.joints], model.jnt_dofadr[self.joints]
         off = mujoco.mjtDisableBit
-        model.opt.disableflags |= int(off.mjDSBL_CONTACT | off.mjDSBL_LIMIT)
+        model.opt.disableflags |= int(off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_ACTUATION)
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         self.data = mujoco.MjData(model)
 
@@ -136,6 +135,7 @@ def _world(uri: str, model: ImportedModel, raw: Raw) -> World:
         physics=replace(world.physics, dt=dt, gravity=gravity),
         geoms=(),
         joints=tuple(replace(joint, lower=-inf, upper=inf) for joint in world.joints),
+        tendons=tuple(t if t.lower == t.upper else replace(t, lower=-inf, upper=inf) for t in world.tendons),
         actuators=tuple(
             Actuator(f"drive {i}", i, ControlMode.EFFORT, 0.0, 0.0)
             for i, joint in enumerate(world.joints)
@@ -176,15 +176,13 @@ def _row(model: ImportedModel, world: World, raw: Raw, row: Row) -> Row:
 def _alone(model: ImportedModel, raw: Raw) -> Iterator[str]:
     """What moves the bodies of a file and is not in the model."""
     option = raw.model.opt
-    if acting := sum(bool(tendon_effects(raw.model, t)) for t in range(raw.model.ntendon)):
-        yield f"{acting} tendons"
+    spatial = [t for t in range(raw.model.ntendon) if not is_fixed(raw.model, t)]
+    if acting := sum(bool(tendon_effects(raw.model, t)) for t in spatial):
+        yield f"{acting} spatial tendons"
     if option.density or option.viscosity:
         yield "a fluid"
     if raw.model.dof_frictionloss[raw.v].any():
         yield "soft dry friction"
-    several = sum("takes" in note.message and f"{VIRTUAL_SHARE:g} of its mass" in note.message for note in model.report)
-    if several:
-        yield f"{several} joints beside others of their body"
     if any(note.where == "joint damping" and "free joint" in note.message for note in model.report):
         yield "damping of a free joint"
     if any(note.where == "joint armature" and "free joint" in note.message for note in model.report):

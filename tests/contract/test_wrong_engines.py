@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wrong engines")]  # one
 
 HERE = Path(__file__).parent
 KINEMATIC = ("wrong_engines", "wrong_states")
-PHYSICAL, CLAIMING = ("wrong_physics",), ("wrong_claims", "wrong_magnitudes")
+PHYSICAL, CLAIMING = ("wrong_physics",), ("wrong_claims", "wrong_couplings", "wrong_magnitudes")
 CLAIMED = {
     Capability.RIGID_BODIES: ("ClaimsRigidBodies",),
     Capability.ARTICULATIONS: ("ClaimsArticulations",),
@@ -28,6 +28,12 @@ CLAIMED = {
     Capability.TERRAIN_TRIMESH: ("ClaimsTriangles",),
     Capability.SHAPE_MESH: ("ClaimsMeshes", "CentredMesh"),
     Capability.MIMIC_JOINTS: ("ClaimsMimics", "MimicsStayBehind"),
+    Capability.MIMIC_CURVES: ("ClaimsCurves",),
+    Capability.TENDONS: ("ClaimsTendons", "TautTendons"),
+    Capability.TENDON_LIMITS: ("ClaimsTendonLimits",),
+    Capability.TENDON_DRIVES: ("ClaimsTendonDrives",),
+    Capability.CONNECTS: ("ClaimsConnects",),
+    Capability.WELDS: ("ClaimsWelds",),
     Capability.JOINT_FRICTION: ("ClaimsJointFriction",),
     Capability.JOINT_SPRINGS: ("ClaimsJointSprings", "SpringsToZero"),
     Capability.ARMATURE: ("StoredArmature", "NoArmature"),

@@ -20,6 +20,8 @@ AXIS, ORIGIN, REST = 0, 3, 6  # columns of `joint_floats` (n, 15): axis, origin 
 MASS, COM, INERTIA, COMPENSATED = 0, 1, 4, 10  # columns of `bodies` (n + 1, 11); com and inertia in the link's frame
 DAMPING, ARMATURE, STIFFNESS, DRAG, LIMIT, PULL, MULTIPLIER, FEED, BOUND, DRY, SPRING, RELAXED = range(12)
 """Columns of `drives` (n, 12)."""
+STIFF, SLOW, SHORT, LONG, SHARES = range(5)
+"""Columns of `tendons` (t, 4 + n): stiffness, damping, the two ends of the rest, and a coefficient for each joint."""
 
 MAX_PASSES = 3
 """Solutions per step: each takes the drives that it finds beyond their limits as constant torques from then on,
@@ -258,6 +260,7 @@ def drive_law(
     joint_floats: Array,
     bodies: Array,
     drives: Array,
+    tendons: Array,
     wrench: Array,
     gravity: Array,
     root: Array,
@@ -276,11 +279,13 @@ def drive_law(
     hold the bare link, and let go of one with much armature only after the torque has built up over many steps. `outer`
     is what else acted in the last step (contacts, limits): the momentum M dv/dt + c that the applied forces do not
     explain. Joints that follow another are coupled in the equation, and the forces of the coupling drop out of it.
+    Tendons pull as joints' springs and damping do, along their lengths.
 
     Args:
         drives: (n, 12): damping, armature, the stiffness and damping of the drive in its mode, its limit,
             kp q* + kd qd*, the multiplier of a joint that follows another (`LEADER` >= 0), ff, and what bounds
             kp (q* - q) + kd qd*, dry friction, and a spring's stiffness and rest.
+        tendons: (t, 4 + n), see its columns.
         memory: of the last step: 1 if it holds one, velocity, c - applied, M. Brought up to date.
         out: (2 n + 6): torques for the joints, efforts of the drives, force and moment on a free root's origin.
 
@@ -324,6 +329,18 @@ def drive_law(
         drag[i] = drives[i, DRAG]
         if not implicit:
             pull[i], drag[i] = min(max(pull[i], -drives[i, LIMIT]), drives[i, LIMIT]), 0.0
+    web, slack = np.zeros((n, n)), np.zeros(n)  # what tendons damp, and how hard at the present speed
+    for t in range(tendons.shape[0]):
+        length, rate = 0.0, 0.0
+        for i in range(n):
+            length += tendons[t, SHARES + i] * motion[0, i]
+            rate += tendons[t, SHARES + i] * motion[1, i]
+        tension = tendons[t, STIFF] * (min(max(length, tendons[t, SHORT]), tendons[t, LONG]) - length)
+        for i in range(n):
+            spring[i] += tendons[t, SHARES + i] * tension
+            slack[i] += tendons[t, SHARES + i] * tendons[t, SLOW] * rate
+            for j in range(n):
+                web[i, j] += tendons[t, SLOW] * tendons[t, SHARES + i] * tendons[t, SHARES + j]
     # What friction alone would not stop within the step slips on; the rest is taken as held. Either may be wrong once.
     rub, grip, hold, passes = np.zeros(n), np.zeros(n), np.zeros(n), MAX_PASSES
     for i in range(n):
@@ -345,7 +362,7 @@ def drive_law(
             row = column[leader[r]]
             total = known[r] + outer[r] - bias[r]
             if r >= first:
-                passive = drives[r - first, DAMPING] * motion[1, r - first]
+                passive = drives[r - first, DAMPING] * motion[1, r - first] + slack[r - first]
                 total += pull[r - first] + rub[r - first] - passive + spring[r - first]
             right[row] += factor[r] * total
             for c in range(size):
@@ -354,6 +371,8 @@ def drive_law(
                     entry += drives[r - first, ARMATURE] + dt * (
                         drag[r - first] + grip[r - first] + drives[r - first, DAMPING]
                     )
+                if r >= first and c >= first:
+                    entry += dt * web[r - first, c - first]
                 reduced[row, column[leader[c]]] += factor[r] * factor[c] * entry
         if not _solve(reduced, right, free):
             return False
@@ -383,7 +402,9 @@ def drive_law(
         slowed = motion[1, i] + dt * gained[v]
         rubbed = rub[i] - dt * grip[i] * gained[v]
         out[i] = effort[i] + rubbed - drives[i, DAMPING] * slowed - drives[i, ARMATURE] * gained[v] + known[v]
-        out[i] += spring[i]
+        out[i] += spring[i] - slack[i]
+        for j in range(n):
+            out[i] -= dt * web[i, j] * gained[first + j]
         out[n + i] = effort[i]
     memory[0] = 1.0
     for r in range(size):

@@ -73,6 +73,7 @@ class DriveArrays:
             bool(
                 (law & loose)[t.joints].any()
                 or sprung[t.joints].any()
+                or len(t.tendons)
                 or damped[t.bodies].any()
                 or (lifted[t.bodies].any() and (t.free or loose[t.joints].any()))
             )
@@ -110,7 +111,15 @@ class TreeDrives:
         self.torque, self.effort, self.base = out[:n], out[n : 2 * n], out[2 * n :]
         self.lift = -bodies[0, K.MASS] * bodies[0, K.COMPENSATED] * gravity
         constants = dt, arrays.implicit, tree.joint_ints, tree.joint_floats, bodies, arrays.acting[env, tree.joints]
-        state = self.wrench, gravity, self.root, self.motion, tree.first, arrays.remembered(env, tree.number)
+        state = (
+            tree.tendons,
+            self.wrench,
+            gravity,
+            self.root,
+            self.motion,
+            tree.first,
+            arrays.remembered(env, tree.number),
+        )
         self._terms = *constants, *state, out
 
     def solve(self) -> bool:

@@ -23,6 +23,7 @@ from anysim.math.compiled import compiled
 from anysim.model.world import Actuation, World
 from anysim_mechanics.drive_gains import DriveGains
 from anysim_mechanics.journal import Journal, Op
+from anysim_mechanics.tendons import Tendons
 
 PUSH, FEED, STIFFNESS, DAMPING, BOUND, ASKED, PASSIVE, GIVEN, SPRING, RELAXED = range(10)
 """Rows of a law (N, 10, J); `ASKED` bounds what the targets ask for, `GIVEN` is what the last substep was given, and
@@ -44,7 +45,7 @@ class DampedDrives:
     Attributes:
         gains, passive: what may be changed: the drives' gains, and the joints' own damping (N, J).
         control: the present commands, None before any. law: (N, 10, J) that of each joint.
-        springs: (2, J) stiffness and rest of each joint's own spring.
+        springs: (2, J) stiffness and rest of each joint's own spring. tendons: what the World's tendons pull with.
         told: (N, ...) what the library has been told of the drives of each env; not a number where nothing yet.
     """
 
@@ -56,6 +57,7 @@ class DampedDrives:
             if driven.count(joint) > 1:
                 raise EngineError(f"joint '{joints[joint].name}' has two drives; this engine takes one per joint")
         self.passive = np.tile(np.array([j.damping for j in joints], dtype=float), (num_envs, 1))
+        self.tendons = Tendons(world)
         self.springs = np.array([[j.stiffness for j in joints], [j.spring_rest for j in joints]])
         self.control: Control | None = None
         self._commanded, self._tuned = 0, 0  # how often commands, and gains, were written
@@ -80,7 +82,7 @@ class DampedDrives:
     def _update(self) -> None:
         """Make the law: a new array, since efforts of the last substep may yet be asked for."""
         self.law = np.zeros((len(self.passive), 10, self.passive.shape[1]))
-        self.law[:, BOUND : ASKED + 1], self.law[:, PASSIVE] = np.inf, self.passive
+        self.law[:, BOUND : ASKED + 1], self.law[:, PASSIVE] = np.inf, self.passive + self.tendons.own_damping
         self.law[:, SPRING : RELAXED + 1] = self.springs
         if self.control is not None:
             self.gains.write(self.control, self.law, _TERMS)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.errors import EngineError
 from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, JointType, World
@@ -36,6 +37,7 @@ class Tree:
     joint_ints: Array  # (n, 3), for the kernels
     joint_floats: Array  # (n, 15)
     multiplier: Array  # (n,)
+    tendons: Array  # (t, 4 + n), for the kernels
 
     @property
     def size(self) -> int:
@@ -95,7 +97,25 @@ def _tree(world: World, frames: Frames, number: int, bodies: list[int]) -> Tree:
             leader = world.joints[leader.mimic.joint]
     free = world.bodies[bodies[0]].kind is BodyKind.FREE
     indices = np.array(bodies, dtype=int), np.array(joints, dtype=int)
-    return Tree(number, *indices, free, 6 if free else 0, ints, floats, multiplier)
+    return Tree(number, *indices, free, 6 if free else 0, ints, floats, multiplier, _tendons(world, row))
+
+
+def _tendons(world: World, row: dict[int, int]) -> Array:
+    """Those of a tree; `row` has the places of its joints.
+
+    Raises:
+        EngineError: a tendon joins joints of two trees.
+    """
+    rows = []
+    for tendon in world.tendons:
+        inside = [joint in row for joint in tendon.joints]
+        if any(inside) and not all(inside):
+            raise EngineError(f"the tendon '{tendon.name}' joins joints of several articulations; give each its own")
+        if all(inside) and (tendon.stiffness or tendon.damping):
+            shares = np.zeros(len(row))
+            np.add.at(shares, [row[joint] for joint in tendon.joints], tendon.coefficients)
+            rows.append([tendon.stiffness, tendon.damping, *tendon.rest, *shares])
+    return np.array(rows, dtype=float).reshape(-1, 4 + len(row))
 
 
 def link_pose(world: World, frames: Frames, body: int) -> Array:

@@ -1,5 +1,6 @@
 """World to MuJoCo model: a natively built MjSpec, compiled."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import mujoco
@@ -9,7 +10,7 @@ from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.engine.control import MODES, acting_gains
 from anysim.errors import EngineError
 from anysim.kinematics.inertia import check_physical
-from anysim.model.world import Actuation, Body, BodyKind, ContactSensor, Joint, JointType, World
+from anysim.model.world import Actuation, Body, BodyKind, ConstraintKind, ContactSensor, Joint, JointType, World
 from anysim_mujoco.audit import UNLIMITED
 from anysim_mujoco.geoms import add_assets, add_geom, add_look
 from anysim_mujoco.inertia import principal
@@ -40,6 +41,8 @@ def build(world: World, options: MujocoOptions) -> BuiltModel:
     joints = [_joint(owner(joint.body), joint, world) for joint in world.joints]
     geoms = [add_geom(spec, owner(geom.body), geom, world) for geom in world.geoms]
     _couplings(spec, world)
+    _constraints(spec, world, owner)
+    _tendons(spec, world)
     _drives(spec, world)
     sensors = [_contact_sensor(spec, world, sensor) for sensor in world.contact_sensors]
     for low, high in sorted(world.excluded_pairs):
@@ -164,15 +167,78 @@ def _couplings(spec: Any, world: World) -> None:
         )
         data = np.zeros_like(equality.data)
         data[:2] = joint.mimic.offset, joint.mimic.multiplier
+        data[2 : 2 + len(joint.mimic.curve)] = joint.mimic.curve
         equality.data = data
+
+
+def _constraints(spec: Any, world: World, owner: Callable[[int], Any]) -> None:
+    """Frames that are held together, as sites: what MuJoCo makes of bodies depends on where they begin."""
+    kinds = {ConstraintKind.CONNECT: mujoco.mjtEq.mjEQ_CONNECT, ConstraintKind.WELD: mujoco.mjtEq.mjEQ_WELD}
+    for one in world.constraints:
+        names = [f"{one.name} (frame)", f"{one.name} (other frame)"]
+        ends = (one.body, one.position, one.quaternion), (one.other, one.other_position, one.other_quaternion)
+        for name, (body, position, quaternion) in zip(names, ends, strict=True):
+            owner(body).add_site(name=name, pos=position, quat=wxyz_from_xyzw(np.asarray(quaternion)))
+        equality = spec.add_equality(
+            name=f"{one.name} (constraint)",
+            type=kinds[one.kind],
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name1=names[0],
+            name2=names[1],
+            solref=constraint_solref(one.softness, world.physics.dt),
+            solimp=STIFF_IMPEDANCE,
+        )
+        data = np.zeros_like(equality.data)
+        data[10] = 1.0  # how a weld weighs turns against shifts
+        equality.data = data
+
+
+def _tendons(spec: Any, world: World) -> None:
+    for one in world.tendons:
+        held = one.lower == one.upper
+        limited = not held and bool(np.isfinite(one.lower) or np.isfinite(one.upper))
+        tendon = spec.add_tendon(
+            name=one.name,
+            stiffness=[one.stiffness, 0.0, 0.0],
+            springlength=one.rest,
+            damping=[one.damping, 0.0, 0.0],
+            frictionloss=one.friction,
+            armature=one.armature,
+            solref_friction=constraint_solref(0.0, world.physics.dt),
+            solimp_friction=DRY_IMPEDANCE,
+            limited=int(limited),
+            range=(max(one.lower, -UNLIMITED), min(one.upper, UNLIMITED)) if limited else (0.0, 0.0),
+            solref_limit=constraint_solref(one.limit_softness, world.physics.dt),
+            solimp_limit=STIFF_IMPEDANCE,
+        )
+        for joint, coefficient in zip(one.joints, one.coefficients, strict=True):
+            tendon.wrap_joint(world.joints[joint].name, coefficient)
+        if held:
+            equality = spec.add_equality(
+                name=f"{one.name} (held)",
+                type=mujoco.mjtEq.mjEQ_TENDON,
+                objtype=mujoco.mjtObj.mjOBJ_TENDON,
+                name1=one.name,
+                solref=constraint_solref(one.limit_softness, world.physics.dt),
+                solimp=STIFF_IMPEDANCE,
+            )
+            data = np.zeros_like(equality.data)
+            data[0] = one.lower
+            equality.data = data
 
 
 def _drives(spec: Any, world: World) -> None:
     for actuator in world.actuators:
+        target, kind = world.joints[actuator.joint].name, mujoco.mjtTrn.mjTRN_JOINT
+        if actuator.shares:
+            target, kind = f"{actuator.name} (drive)", mujoco.mjtTrn.mjTRN_TENDON
+            tendon = spec.add_tendon(name=target)
+            for joint, ratio in ((actuator.joint, 1.0), *actuator.shares):
+                tendon.wrap_joint(world.joints[joint].name, ratio)
         element = spec.add_actuator(
             name=actuator.name,
-            target=world.joints[actuator.joint].name,
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target=target,
+            trntype=kind,
             gaintype=mujoco.mjtGain.mjGAIN_FIXED,
             biastype=mujoco.mjtBias.mjBIAS_AFFINE,
             ctrllimited=0,

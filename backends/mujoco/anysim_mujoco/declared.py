@@ -26,6 +26,17 @@ _APPROXIMATE = {
         swing=0.034,
     ),
     Capability.MIMIC_JOINTS: approximately("a stiff soft constraint: {lag:g} m at 20 N on a finger of 15 g", lag=3e-4),
+    Capability.MIMIC_CURVES: "a stiff soft constraint, as that of other mimic joints",
+    Capability.TENDONS: approximately(
+        "damping between joints of different branches acts at the beginning of a step: within {dragged:g} m of the "
+        "solution of two sliders",
+        dragged=2e-4,
+    ),
+    Capability.TENDON_LIMITS: "a stiff soft constraint, as that of joint limits",
+    Capability.CONNECTS: approximately("a stiff soft constraint: {apart:g} m at 110 N on 1 kg", apart=2e-5),
+    Capability.WELDS: approximately(
+        "a stiff soft constraint: {askew:g} rad at 5 N m on a rod of 1 kg, and as a connect", askew=1.3e-3
+    ),
     Capability.JOINT_LIMITS: approximately(
         "a stiff soft constraint, met {late:g} step late: {beyond:g} rad beyond at 87 N m on 0.1 kg m^2; a drive whose "
         "dt kd is above its inertia swings on it (kd 300 on 0.115 kg at 2 ms: by {chatter:.0%} of 20 N)",

@@ -27,7 +27,11 @@ class Drives:
         self.limited = world.physics.velocity_limits and bool(np.isfinite(speeds).any())
         """Whether `limit` must be called before each substep."""
         self._speeds = speeds
-        self._qpos, self._driven = batch.bind("qpos"), layout.joint_q[[a.joint for a in actuators]]
+        self._qpos = batch.bind("qpos")
+        self._driven = np.zeros((batch.model.nq, len(actuators)))
+        for i, actuator in enumerate(actuators):
+            for joint, ratio in ((actuator.joint, 1.0), *actuator.shares):
+                self._driven[layout.joint_q[joint], i] += ratio
         self._control: Control | None = None
         self._batch = batch
         self._input = batch.bind("ctrl")
@@ -62,7 +66,7 @@ class Drives:
         """Write the control input of all envs for the next substep, the velocity that it asks for limited."""
         if self._control is None:
             return
-        held = self._stiffness * self._qpos[:, self._driven]
+        held = self._stiffness * (self._qpos @ self._driven)
         bound = speed_bound(self._damping, self._speeds)
         push = self._stiffness * self._control.position - held + self._damping * self._control.velocity
         self._input[...] = np.clip(push, -bound, bound) + held + self._control.effort

@@ -34,7 +34,7 @@ class Retired:
             first = model.jnt_qposadr[joint]
             size = 7 if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE else 1
             self._q[first : first + size] = entity[model.jnt_bodyid[joint]]
-        self._coupling = entity[model.jnt_bodyid[model.eq_obj1id]]  # all equalities here couple joints
+        self._coupling = entity[_coupled(model)]  # (neq, 2)
         self._qpos, self._qvel, self._warm = (batch.bind(name) for name in ("qpos", "qvel", "qacc_warmstart"))
         self._active = batch.bind("eq_active")
         self._rest = np.array(model.qpos0)
@@ -56,7 +56,7 @@ class Retired:
         self._parameters.place(ids, fields)
         self._still_q[ids], self._still_v[ids] = ~there[:, self._q], ~there[:, self._dof]
         self._any = bool(self._still_v.any())
-        self._coupled[ids] = there[:, self._coupling]
+        self._coupled[ids] = there[:, self._coupling].all(axis=2)
 
     def uncouple(self, ids: Array) -> None:
         """Switch off the couplings of what is absent, in state rows that were written anew."""
@@ -68,3 +68,15 @@ class Retired:
             np.copyto(self._qpos, self._rest, where=self._still_q)
             np.copyto(self._qvel, 0.0, where=self._still_v)
             np.copyto(self._warm, 0.0, where=self._still_v)
+
+
+def _coupled(model: Any) -> Array:
+    """(neq, 2) the bodies at both ends of equalities: of joints, of the first joint of a tendon, or of sites."""
+    joint, site, tendon = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_TENDON
+    first = model.wrap_objid[model.tendon_adr] if model.ntendon else np.zeros(0, dtype=int)
+    owner = {int(joint): model.jnt_bodyid, int(site): model.site_bodyid, int(tendon): model.jnt_bodyid[first]}
+    found = np.zeros((model.neq, 2), dtype=int)
+    for e in range(model.neq):
+        for side, thing in enumerate((int(model.eq_obj1id[e]), int(model.eq_obj2id[e]))):
+            found[e, side] = owner[int(model.eq_objtype[e])][thing] if thing >= 0 else 0
+    return found

@@ -14,7 +14,7 @@ from anysim.c_output import quiet
 from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.model.world import Geom, HeightField, HeightFieldShape, MeshShape, Plane, World
+from anysim.model.world import ConstraintKind, Geom, HeightField, HeightFieldShape, MeshShape, Plane, Quat, Vec3, World
 from anysim_mechanics.pair_factors import PairRules
 from anysim_mechanics.trees import Frames, Tree, frames_of, shifted, trees_of
 from anysim_pybullet.bullet import bullet, connect, disconnect
@@ -25,7 +25,10 @@ from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, w
 
 STATIC_GROUP, MOVING_GROUP = 2, 1
 MIMIC_FORCE = 1e6
-"""[N, N m] that keeps a joint with its leader: more than anything here exerts."""
+"""[N, N m] that keeps a joint with its leader, and held frames together: more than anything here exerts."""
+
+HOLDING_ERP = 0.8
+"""The share of a gap between held frames that a step closes."""
 
 QUARTER = np.array([0.0, 0.0, sqrt(0.5), sqrt(0.5)])
 """A quarter turn about z."""
@@ -167,7 +170,8 @@ class Env:
                     self._add_tree(p, tree)
             self._filter(p)
             self._couple(p)
-        self._measure(p)
+            self._measure(p)
+            self._hold(p)
 
     def _choose(self, cast: Cast, com: Array | None) -> None:
         self.cast, self.frames = cast, self.plan.frames if com is None else shifted(self.plan.frames, com)
@@ -195,7 +199,8 @@ class Env:
             self._couple(p)
             # else Bullet keeps the first file of a name that it reads, and restores that state again and again
             p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.id)
-        self._measure(p)
+            self._measure(p)
+            self._hold(p)
 
     @contextmanager
     def _building(self, p: Any) -> Iterator[None]:
@@ -351,6 +356,31 @@ class Env:
         for first, second in zip(*np.nonzero(np.triu(rules.weight[np.ix_(shapes, shapes)] == 0.0, 1)), strict=True):
             (uid_a, link_a), (uid_b, link_b) = self.shape_at[int(shapes[first])], self.shape_at[int(shapes[second])]
             p.setCollisionFilterPair(uid_a, uid_b, link_a, link_b, 0, physicsClientId=self.id)
+
+    def _hold(self, p: Any) -> None:
+        """Hold the frames of the World's constraints together; Bullet has them at the bodies' centres of mass."""
+        kinds = {ConstraintKind.CONNECT: p.JOINT_POINT2POINT, ConstraintKind.WELD: p.JOINT_FIXED}
+        for one in self.plan.world.constraints:
+            ends = (one.body, one.position, one.quaternion), (one.other, one.other_position, one.other_quaternion)
+            if any(body != WORLD and self.body_at[body][0] < 0 for body, *_ in ends):
+                continue
+            (uid, link), place, turn = self._end(*ends[0])
+            (other, other_link), other_place, other_turn = self._end(*ends[1])
+            frames = place, other_place, turn, other_turn
+            number = p.createConstraint(
+                uid, link, other, other_link, kinds[one.kind], [0, 0, 0], *frames, physicsClientId=self.id
+            )
+            p.changeConstraint(number, maxForce=MIMIC_FORCE, erp=HOLDING_ERP, physicsClientId=self.id)
+
+    def _end(self, body: int, position: Vec3, quaternion: Quat) -> tuple[tuple[int, int], list[float], list[float]]:
+        """Bullet's body and link, and a frame of the body in the axes of its inertia."""
+        pose, place = P.pose(position, quaternion), (-1, -1)
+        if body != WORLD:
+            place = self.body_at[body]
+            local = self.local[body]
+            pose[:3] -= local[7:]
+            pose = P.compose(P.inverse(local[:7]), pose)
+        return place, pose[:3].tolist(), pose[3:].tolist()
 
     def _couple(self, p: Any) -> None:
         world = self.plan.world

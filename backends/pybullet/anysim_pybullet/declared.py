@@ -60,7 +60,7 @@ _APPROXIMATE = {
     ),
     Capability.CONTROL_VELOCITY: "computed in each step, as position control is",
 }
-_ABSENT = (Capability.SOLVER_SETTINGS,)
+_ABSENT = (Capability.SOLVER_SETTINGS, Capability.MIMIC_CURVES, Capability.TENDON_LIMITS, Capability.TENDON_DRIVES)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

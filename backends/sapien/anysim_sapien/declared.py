@@ -22,6 +22,12 @@ _APPROXIMATE = {
         "a stiff spring: {lag:g} m at 20 N on a gripper's finger; only links with one parent, or a link and its child",
         lag=5e-5,
     ),
+    Capability.TENDONS: approximately(
+        "damping between two joints acts at the beginning of a step, that of each at its end: within {dragged:g} m of "
+        "the solution of two sliders",
+        dragged=2e-4,
+    ),
+    Capability.WELDS: approximately("a stiff drive keeps them from turning: {askew:g} rad at 5 N m", askew=3e-5),
     Capability.ACTUATION_NATIVE: approximately(
         "PhysX takes the stiffness implicitly too: within {astray:g} rad of the law in motion (kp 400, kd 40 on 0.5 kg "
         "m^2), blocked within {stalled:.1%}. The effort limit bounds a driven joint's own damping with the drive",
@@ -49,7 +55,7 @@ _APPROXIMATE = {
     ),
     Capability.CONTACT_POINTS: "the friction of a pair, as sensors have it, is shared as the normal forces are",
 }
-_ABSENT = (Capability.RENDER_SHADOWS,)
+_ABSENT = (Capability.RENDER_SHADOWS, Capability.MIMIC_CURVES, Capability.TENDON_LIMITS, Capability.TENDON_DRIVES)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

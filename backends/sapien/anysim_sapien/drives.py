@@ -27,6 +27,8 @@ class LawDrives(D.DampedDrives):
             count = D.substep(
                 self.law, env, joints, position, velocity, self.kind, UNBOUNDED, self.told, force, news, count
             )
+            if self.tendons.any:
+                force += self.tendons.forces(joints, position, velocity)
             handle.set_qf(force)
         if count:
             self._tell(env, scene, count)
@@ -50,7 +52,7 @@ class NativeDrives(D.DampedDrives):
 
     def __init__(self, world: World, num_envs: int) -> None:
         self.wanted = np.zeros((num_envs, len(world.joints), 6))
-        self._sprung = any(joint.stiffness for joint in world.joints)
+        self._sprung = any(joint.stiffness for joint in world.joints) or bool(world.tendons)
         super().__init__(world, num_envs, np.full_like(self.wanted, np.nan))
 
     def _update(self) -> None:
@@ -82,8 +84,9 @@ class NativeDrives(D.DampedDrives):
     def substep(self, env: int, scene: EnvScene) -> None:
         """Before a substep: the force of springs; PhysX has all of the law."""
         for tree in scene.trees if self._sprung else ():
-            stiffness, rest = self.springs[:, tree.joints]
-            fed = self.wanted[env, tree.joints, 5] + stiffness * (rest - tree.handle.get_qpos())
+            (stiffness, rest), position = self.springs[:, tree.joints], tree.handle.get_qpos()
+            fed = self.wanted[env, tree.joints, 5] + stiffness * (rest - position)
+            fed += self.tendons.forces(tree.joints, position, tree.handle.get_qvel())
             tree.handle.set_qf(fed.astype(np.float32))
 
 

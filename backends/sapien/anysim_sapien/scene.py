@@ -11,20 +11,24 @@ from weakref import WeakSet
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.model.world import Body, BodyKind, JointType, Solver
+from anysim.model.world import Body, BodyKind, Constraint, ConstraintKind, JointType, Solver
 from anysim_mechanics.exclusion_groups import Group
 from anysim_mechanics.journal import Op
+from anysim_mechanics.mimic_tendons import tendon_of
 from anysim_sapien.library import physx, sapien
 from anysim_sapien.packing import Packing, pack
 from anysim_sapien.parts import SceneParts, Tree
-from anysim_sapien.recipe import Recipe, Values, tendon_of
-from anysim_sapien.shapes import make_shape
+from anysim_sapien.recipe import Recipe, Values
+from anysim_sapien.shapes import make_shape, to_pose
 
 FAST = 1e9
 """Stands for no limit where PhysX has a highest speed: 100 m/s and 50 rad/s by default."""
 
 COUPLING = 1e6
 """Stiffness of a mimic joint's tendon [N m/rad or N/m], taken implicitly."""
+
+WELD = 1e7, 6e3
+"""Stiffness [1/s^2] and damping [1/s] of the drive that keeps a weld from turning, taken implicitly."""
 
 UNBOUNDED = 3.4e38
 
@@ -70,6 +74,8 @@ class EnvScene(SceneParts):
             self._actor(body)
         for members in recipe.layout.trees:
             self._add_tree(members)
+        for constraint in world.constraints:
+            self._hold(constraint)
         self._links = [self.bodies[body] for body in recipe.layout.links]
         self._order: list[Array] | None = None
         for index in np.flatnonzero((values.joint_friction > 0) & self.layout.joint_there):
@@ -174,6 +180,25 @@ class EnvScene(SceneParts):
         in_parent, in_child = self.recipe.common.frames[self.recipe.world.body_joint[body]]
         self.bodies[body].joint.set_pose_in_parent(in_parent)
         self.bodies[body].joint.set_pose_in_child(in_child)
+
+    def _hold(self, one: Constraint) -> None:
+        """Hold the frames of a constraint together by a joint of PhysX' six axes.
+
+        Shifts are locked. Turns are not, even where PhysX is told so: a stiff drive holds them.
+        """
+        ends = (one.body, one.position, one.quaternion), (one.other, one.other_position, one.other_quaternion)
+        if any(body != WORLD and self.bodies[body] is None for body, *_ in ends):
+            return
+        (body, *frame), (other, *other_frame) = ends
+        joint = physx.PhysxDriveComponent(self.bodies[body])
+        joint.set_parent(None if other == WORLD else self.bodies[other])
+        joint.set_pose_in_child(to_pose(np.concatenate(frame)))
+        joint.set_pose_in_parent(to_pose(np.concatenate(other_frame)))
+        for lock in (joint.set_limit_x, joint.set_limit_y, joint.set_limit_z):
+            lock(0.0, 0.0)
+        if one.kind is ConstraintKind.WELD:
+            joint.set_drive_property_slerp(*WELD, UNBOUNDED, "acceleration")
+        self.entities[body].add_component(joint)
 
     def _tendons(self, handle: Any, joints: Array) -> None:
         """Mimic joints: a stiff spring between follower and leader."""

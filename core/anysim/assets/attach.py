@@ -17,7 +17,7 @@ from anysim.errors import AssetError, listing, suggest
 from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.hash import split
-from anysim.model.world import Body, Geom, HeightFieldShape, Joint, MeshShape, Site
+from anysim.model.world import Body, Constraint, Geom, HeightFieldShape, Joint, MeshShape, Quat, Site, Vec3
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _GeomOrSite = TypeVar("_GeomOrSite", Geom, Site)
@@ -74,6 +74,14 @@ class _Attachment:
             links={k: _at(self.body, b) for k, b in model.links.items()}
             | {self._named(k): self.part_body[b] for k, b in part.links.items()},
             actuator_hints=(*_hints(model.actuator_hints, self.joint), *_hints(part.actuator_hints, self.part_joint)),
+            tendons=(
+                *(t.renumbered(self.joint.__getitem__) for t in model.tendons),
+                *(t.renumbered(self.part_joint.__getitem__, self.prefix) for t in part.tendons),
+            ),
+            constraints=(
+                *(c.renumbered(self.body.__getitem__) for c in model.constraints),
+                *map(self._held, part.constraints),
+            ),
             excluded_pairs=_pairs(model.excluded_pairs, self.body) | _pairs(part.excluded_pairs, self.part_body),
             report=(*model.report, *part.report, *self._spread()),
         )
@@ -169,6 +177,22 @@ class _Attachment:
             geoms.append(replace(self._placed(geom), shape=shape))
         return geoms, [*self.model.geom_links, *(self._named(name) for name in self.part.geom_links)]
 
+    def _held(self, constraint: Constraint) -> Constraint:
+        """A constraint of the part; frames on its root move along with that."""
+        first = self._held_end(constraint.body, constraint.position, constraint.quaternion)
+        second = self._held_end(constraint.other, constraint.other_position, constraint.other_quaternion)
+        return replace(
+            constraint,
+            name=self._named(constraint.name),
+            **dict(zip(("body", "position", "quaternion"), first, strict=True)),
+            **dict(zip(("other", "other_position", "other_quaternion"), second, strict=True)),
+        )
+
+    def _held_end(self, body: int, position: Vec3, quaternion: Quat) -> tuple[int, Vec3, Quat]:
+        if body <= 0:
+            return self.carrier, *split(P.compose(self.frame, P.pose(position, quaternion)))
+        return self.part_body[body], position, quaternion
+
     def _placed(self, thing: _GeomOrSite) -> _GeomOrSite:
         """A geom or site of the part; what is on its root moves along with that."""
         pose = P.pose(thing.position, thing.quaternion)
@@ -193,7 +217,7 @@ def _renumbered(joint: Joint, body: list[int], number: list[int]) -> Joint:
 
 
 def _hints(hints: Iterable[ActuatorHint], number: list[int]) -> list[ActuatorHint]:
-    return [hint._replace(joint=number[hint.joint]) for hint in hints]
+    return [hint.renumbered(number.__getitem__) for hint in hints]
 
 
 def _pairs(pairs: Iterable[tuple[int, int]], body: list[int]) -> frozenset[tuple[int, int]]:

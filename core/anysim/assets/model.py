@@ -5,7 +5,7 @@ puts it into a World under an entity's name. Importers of other formats are entr
 `anysim.importers`, functions with the signature of `Importer`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
 from math import isinf, isnan
@@ -15,7 +15,20 @@ from typing import Any, Literal, NamedTuple, Protocol
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.model.affordances import Affordance
 from anysim.model.frames import FixedFrame
-from anysim.model.world import ORIGIN, Body, ControlMode, Geom, HeightField, Joint, Material, Mesh, Site, Texture
+from anysim.model.world import (
+    ORIGIN,
+    Body,
+    Constraint,
+    ControlMode,
+    Geom,
+    HeightField,
+    Joint,
+    Material,
+    Mesh,
+    Site,
+    Tendon,
+    Texture,
+)
 
 
 class ImportNote(NamedTuple):
@@ -40,13 +53,21 @@ class Fate(StrEnum):
 
 
 class ActuatorHint(NamedTuple):
-    """A drive that the source itself declares, for what the catalogue entry leaves open; `joint` is local."""
+    """A drive that the source itself declares, for what the catalogue entry leaves open; joints are local.
+
+    `shares` are the further joints of a drive that pulls at a tendon, see `anysim.model.world.Actuator`.
+    """
 
     joint: int
     mode: ControlMode
     kp: float
     kd: float
     effort_limit: float
+    shares: tuple[tuple[int, float], ...] = ()
+
+    def renumbered(self, joint: Callable[[int], int]) -> "ActuatorHint":
+        """The same drive where joints have other numbers."""
+        return self._replace(joint=joint(self.joint), shares=tuple((joint(j), ratio) for j, ratio in self.shares))
 
 
 @dataclass(frozen=True)
@@ -61,7 +82,7 @@ class ImportedModel:
       its body, and `geom_links` tells for each geom the link it was on in the source.
     - Collision geoms have `collides` set; visual ones have `visible` set and do not collide. A mesh that collides holds
       its convex hull. `meshes` have a `hash` of source bytes and processing, names unique within the model.
-    - `mimic` inside joints, `excluded_pairs` and hints use local indices.
+    - `mimic` inside joints, tendons, constraints, `excluded_pairs` and hints use local indices.
     """
 
     name: str
@@ -79,6 +100,8 @@ class ImportedModel:
     excluded_pairs: frozenset[tuple[int, int]] = frozenset()
     report: tuple[ImportNote, ...] = ()
     affordances: tuple[Affordance, ...] = ()
+    tendons: tuple[Tendon, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
 
     def drive_of(self, joint: int) -> ActuatorHint | None:
         """The drive that the source declares for a joint; None where it declares none, or several."""
@@ -105,7 +128,13 @@ def strange_number(model: ImportedModel) -> str:
 
     Only limits may be infinite. Arrays of meshes and heights are not looked at: who makes them does.
     """
-    named = {"body": model.bodies, "joint": model.joints, "geom": model.geoms, "site": model.sites}
+    named: dict[str, tuple[Any, ...]] = {
+        "body": model.bodies,
+        "joint": model.joints,
+        "geom": model.geoms,
+        "site": model.sites,
+    }
+    named |= {"tendon": model.tendons, "constraint": model.constraints}
     for kind, parts in named.items():
         for number, part in enumerate(parts):
             for name, value in _strange(part):

@@ -67,7 +67,9 @@ def planar(model: ImportedModel, name: str) -> ImportedModel:
         geoms=tuple(replace(geom, body=geom.body + _ADDED) for geom in model.geoms),
         sites=tuple(replace(site, body=site.body + _ADDED) for site in model.sites),
         links={"rail": 0, **{link: body + _ADDED for link, body in model.links.items()}},
-        actuator_hints=tuple(hint._replace(joint=hint.joint + _ADDED) for hint in model.actuator_hints),
+        actuator_hints=tuple(hint.renumbered(lambda j: j + _ADDED) for hint in model.actuator_hints),
+        tendons=tuple(tendon.renumbered(lambda j: j + _ADDED) for tendon in model.tendons),
+        constraints=tuple(c.renumbered(lambda b: b + _ADDED) for c in model.constraints),
         excluded_pairs=frozenset((a + _ADDED, b + _ADDED) for a, b in model.excluded_pairs),
     )
 

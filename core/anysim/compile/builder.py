@@ -46,7 +46,7 @@ class WorldBuilder:
         self._textures = {texture.name: texture for texture in world.textures}
         self._materials = {material.name: material for material in world.materials}
         self.excluded = set(world.excluded_pairs)
-        self.tiles = world.tiles
+        self.tiles, self.tendons, self.constraints = world.tiles, list(world.tendons), list(world.constraints)
         self._notes = dict.fromkeys(world.notes)
 
     def build(self) -> World:
@@ -66,6 +66,8 @@ class WorldBuilder:
             materials=tuple(self._materials.values()),
             excluded_pairs=frozenset(self.excluded),
             tiles=self.tiles,
+            tendons=tuple(self.tendons),
+            constraints=tuple(self.constraints),
             notes=tuple(self._notes),
         )
 
@@ -101,6 +103,8 @@ class WorldBuilder:
             ends = [x if abs(x) < FAR else copysign(inf, x) for x in (part.lower, part.upper)]
             part = replace(part, name=full(part.name), body=part.body + body, mimic=mimic)
             self.joints.append(replace(part, lower=ends[0], upper=ends[1]))
+        self.tendons += [part.renumbered(lambda j: j + joint, f"{name}.") for part in model.tendons]
+        self.constraints += [part.renumbered(shift, f"{name}.") for part in model.constraints]
         for part in model.geoms:
             shape: Any = part.shape
             if isinstance(shape, MeshShape):

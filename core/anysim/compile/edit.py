@@ -125,7 +125,11 @@ def without_entity(world: World, name: str) -> World:
         ),
         geoms=geoms,
         sites=tuple(replace(s, body=bodies[s.body]) for s in world.sites if s.body in bodies),
-        actuators=tuple(replace(a, joint=joints[a.joint]) for a in world.actuators if a.joint in joints),
+        actuators=tuple(
+            replace(a, joint=joints[a.joint], shares=tuple((joints[j], ratio) for j, ratio in a.shares))
+            for a in world.actuators
+            if a.joint in joints
+        ),
         cameras=tuple(
             replace(c, body=bodies[c.body], look_at=c.look_at if c.look_at in left else None)
             for c in world.cameras
@@ -147,6 +151,12 @@ def without_entity(world: World, name: str) -> World:
         ),
         robots=tuple(_robot(r, joints, sites, drives) for r in world.robots if r.name != name),
         meshes=tuple(mesh for mesh in world.meshes if mesh.name in shown),
+        tendons=tuple(t.renumbered(lambda j: joints[j]) for t in world.tendons if t.joints[0] in joints),
+        constraints=tuple(
+            c.renumbered(lambda b: bodies[b])
+            for c in world.constraints
+            if c.body in bodies and (c.other == WORLD or c.other in bodies)
+        ),
         excluded_pairs=frozenset(
             (bodies[a], bodies[b]) for a, b in world.excluded_pairs if a in bodies and b in bodies
         ),

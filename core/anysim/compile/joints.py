@@ -52,8 +52,7 @@ def with_joints(model: ImportedModel, joints: Mapping[str, ObjectJointSpec], iss
     made = [_joint(model, joint, asked_of(joints, joint.name), issues) for joint in model.joints]
     for i, joint in enumerate(made):
         if joint.mimic is not None:
-            start = joint.mimic.multiplier * made[joint.mimic.joint].initial + joint.mimic.offset
-            made[i] = replace(joint, initial=start)
+            made[i] = replace(joint, initial=joint.mimic.position(made[joint.mimic.joint].initial))
     return replace(model, joints=tuple(made))
 
 

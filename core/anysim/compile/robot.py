@@ -215,8 +215,7 @@ class _Assembly:
                     issues.add(name, f"'{name}' follows '{joints[mimic.joint].name}'; give the velocity of that one")
         for i, joint in enumerate(joints):
             if joint.mimic is not None:
-                leader = joints[joint.mimic.joint]
-                joints[i] = replace(joint, initial=joint.mimic.multiplier * leader.initial + joint.mimic.offset)
+                joints[i] = replace(joint, initial=joint.mimic.position(joints[joint.mimic.joint].initial))
         return joints
 
     def _gains(self, channel: str, joint: str) -> GainSpec:
@@ -260,8 +259,10 @@ class _Assembly:
                 effort = min(effort, own.effort_limit) if own is not None else effort
                 effort = effort if gains.effort_limit is None else gains.effort_limit
                 drive = f"{self.name}.{joints[index].name}"
+                start = entity.joint_start
+                shares = () if own is None else tuple((start + j, ratio) for j, ratio in own.shares)
                 builder.actuators.append(
-                    Actuator(drive, entity.joint_start + index, ControlMode(spec.mode), gains.kp, gains.kd, effort)
+                    Actuator(drive, start + index, ControlMode(spec.mode), gains.kp, gains.kd, effort, shares)
                 )
             self._check_channel(spec, issues)
             world = tuple(entity.joint_start + index for index in indices)

@@ -90,13 +90,15 @@ def with_followers(
     if not extra:
         return joints, position, velocity
     columns = [column for _, column, _ in extra]
-    ratio = np.array([mimic.multiplier for *_, mimic in extra])
-    offset = np.array([mimic.offset for *_, mimic in extra])
     all_joints = np.concatenate([joints, [i for i, *_ in extra]])
-    if position is not None:
-        position = np.concatenate([position, position[:, columns] * ratio + offset], axis=1)
     if velocity is not None:
-        velocity = np.concatenate([velocity, velocity[:, columns] * ratio], axis=1)
+        if position is None and any(mimic.curve for *_, mimic in extra):
+            raise EngineError("a joint that follows another by a curve needs a position beside a velocity")
+        place = np.zeros_like(velocity) if position is None else position
+        rate = np.stack([np.broadcast_to(m.rate(place[:, c]), len(place)) for _, c, m in extra], axis=1)
+        velocity = np.concatenate([velocity, velocity[:, columns] * rate], axis=1)
+    if position is not None:
+        position = np.concatenate([position, np.stack([m.position(position[:, c]) for _, c, m in extra], 1)], axis=1)
     return all_joints, position, velocity
 
 

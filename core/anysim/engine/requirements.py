@@ -17,6 +17,8 @@ from anysim.model.world import (
     Body,
     BodyKind,
     Camera,
+    Constraint,
+    ConstraintKind,
     ControlMode,
     EntityKind,
     Geom,
@@ -24,6 +26,7 @@ from anysim.model.world import (
     Joint,
     MeshShape,
     Plane,
+    Tendon,
     World,
 )
 
@@ -61,6 +64,8 @@ def _things(world: World) -> Iterator[tuple[str, str, Rows]]:
     links = [joint.body for joint in world.joints]
     yield from ((f"body '{body.name}'", path[index], _of_body(body)) for index, body in enumerate(world.bodies))
     yield from ((f"joint '{joint.name}'", path[joint.body], _of_joint(world, joint)) for joint in world.joints)
+    yield from ((f"tendon '{t.name}'", path[links[t.joints[0]]], _of_tendon(t)) for t in world.tendons)
+    yield from ((f"constraint '{c.name}'", path[c.body], _of_constraint(c)) for c in world.constraints)
     yield from ((f"drive '{a.name}'", path[links[a.joint]], _of_drive(a)) for a in world.actuators)
     if world.actuators:
         yield "physics.actuation", "physics.actuation", _of_actuation(world.physics.actuation)
@@ -110,11 +115,34 @@ def _of_joint(world: World, joint: Joint) -> Rows:
     leader = "" if joint.mimic is None else world.joints[joint.mimic.joint].name
     return (
         (C.MIMIC_JOINTS, joint.mimic is not None, f"follows '{leader}'"),
+        (C.MIMIC_CURVES, joint.mimic is not None and joint.mimic.curve, f"follows '{leader}' by a curve"),
         (C.JOINT_FRICTION, joint.friction > 0, "has dry friction"),
         (C.JOINT_SPRINGS, joint.stiffness != 0, "has a spring"),
         (C.ARMATURE, joint.armature > 0, "has armature"),
         (C.JOINT_LIMITS, isfinite(joint.lower) or isfinite(joint.upper), "is limited"),
     )
+
+
+def _of_tendon(tendon: Tendon) -> Rows:
+    limited = isfinite(tendon.lower) or isfinite(tendon.upper)
+    own = (
+        "is held"
+        if tendon.lower == tendon.upper
+        else "is limited"
+        if limited
+        else "has dry friction"
+        if tendon.friction
+        else "has armature"
+    )
+    return (
+        (C.TENDONS, tendon.stiffness or tendon.damping, "pulls at joints"),
+        (C.TENDON_LIMITS, limited or tendon.friction or tendon.armature, own),
+    )
+
+
+def _of_constraint(constraint: Constraint) -> Rows:
+    welded = constraint.kind is ConstraintKind.WELD
+    return ((C.WELDS, welded, "holds two frames together"), (C.CONNECTS, not welded, "holds two points together"))
 
 
 def _of_drive(actuator: Actuator) -> Rows:
@@ -123,6 +151,7 @@ def _of_drive(actuator: Actuator) -> Rows:
         (C.CONTROL_VELOCITY, actuator.mode is ControlMode.VELOCITY, "is velocity controlled"),
         (C.CONTROL_EFFORT, actuator.mode is ControlMode.EFFORT, "is effort controlled"),
         (C.EFFORT_LIMITS, isfinite(actuator.effort_limit), "is limited"),
+        (C.TENDON_DRIVES, actuator.shares, "pulls at a tendon of several joints"),
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.model.affordances import Affordance
@@ -97,11 +97,23 @@ class Body:
 
 
 class Mimic(NamedTuple):
-    """This joint follows another: position = multiplier * leader + offset."""
+    """This joint follows another: position = offset + multiplier * leader + curve[0] * leader^2 + curve[1] * leader^3.
+
+    `curve` goes on so, and is empty where the two are in proportion, which is what most engines can hold.
+    """
 
     joint: int
     multiplier: float = 1.0
     offset: float = 0.0
+    curve: tuple[float, ...] = ()
+
+    def position(self, leader: Any) -> Any:
+        """Where this joint is for a position of its leader, a number or an array."""
+        return self.offset + self.multiplier * leader + sum(c * leader ** (k + 2) for k, c in enumerate(self.curve))
+
+    def rate(self, leader: Any) -> Any:
+        """How fast this joint moves for each unit of its leader's velocity, there."""
+        return self.multiplier + sum((k + 2) * c * leader ** (k + 1) for k, c in enumerate(self.curve))
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +176,11 @@ class Site:
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
-    """The drive of one joint; the law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped to +-effort_limit."""
+    """The drive of one joint; the law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped to +-effort_limit.
+
+    A drive that pulls at a tendon has `shares`, further joints and their coefficients: q is then the position of
+    `joint` plus these times theirs, and u acts on them times the same.
+    """
 
     name: str
     joint: int
@@ -172,6 +188,7 @@ class Actuator:
     kp: float
     kd: float
     effort_limit: float = inf
+    shares: tuple[tuple[int, float], ...] = field(default=(), metadata=HASHED_IF_GIVEN)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.model.appearance import Material as Material, Texture as Texture
+from anysim.model.couplings import Constraint as Constraint, ConstraintKind as ConstraintKind, Tendon as Tendon
 from anysim.model.parts import (
     FAR as FAR,
     HASHED_IF_GIVEN,
@@ -93,6 +94,8 @@ class World:
     """Logical objects that may differ between envs. An entity that is in none of them is there in every env."""
     tiles: tuple[Tile, ...] = ()
     """Pieces of tiled ground, row by row; an env's scene stands on one of them. Empty where there is one ground."""
+    tendons: tuple[Tendon, ...] = field(default=(), metadata=HASHED_IF_GIVEN)
+    constraints: tuple[Constraint, ...] = field(default=(), metadata=HASHED_IF_GIVEN)
     scenery: Scenery = field(default=Scenery(), metadata=HASHED_IF_GIVEN)
     notes: tuple[tuple[str, str], ...] = field(default=(), compare=False, metadata=NEVER_HASHED)
     """The name of a thing, and what its source says that is not so here; see `anysim.assets.model.ImportNote`."""

@@ -15,7 +15,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability as C
 from anysim.model.world import Box, ContactSensor, ControlMode, Cylinder, Sphere, Surface
-from anysim.testing import drive_errors as drives, tolerances, worlds
+from anysim.testing import coupled, drive_errors as drives, tolerances, worlds
 from anysim.testing.compare import sliding_friction
 from anysim.testing.drive_errors import Build
 from anysim.testing.sketch import Sketch
@@ -207,6 +207,9 @@ MEASURES: Mapping[str, Measure] = {
         (torsion, C.TORSIONAL_FRICTION, tolerances.SLIDING),
         (felt, C.CONTACT_SENSORS, tolerances.WEIGHT),
         (shift, C.VARYING_ENTITIES, tolerances.ABSENT),
+        (coupled.apart, C.CONNECTS, tolerances.HELD),
+        (coupled.askew, C.WELDS, tolerances.HELD),
+        (coupled.dragged, C.TENDONS, tolerances.FOLLOWER),
         (drives.lag, C.MIMIC_JOINTS, tolerances.FOLLOWER),
         (drives.beyond, C.JOINT_LIMITS, tolerances.LIMIT),
         (drives.late, C.JOINT_LIMITS, tolerances.LATE),

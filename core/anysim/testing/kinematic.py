@@ -75,6 +75,8 @@ class NullEngine(SimEngine):
                     C.SHAPE_MESH,
                     C.JOINT_FRICTION,
                     C.JOINT_SPRINGS,
+                    C.TENDONS,
+                    C.TENDON_LIMITS,
                     C.ARMATURE,
                     C.EFFORT_LIMITS,
                     C.ACTUATION_EXPLICIT,

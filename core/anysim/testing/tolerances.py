@@ -84,6 +84,9 @@ DENT = 2e-3
 FOLLOWER = 2e-3
 """[m or rad]: lag of a mimic joint during motion, where it is a soft constraint."""
 
+HELD = 1e-4
+"""[m]: between points that are held together, in motion; ten times that [rad] between axes."""
+
 RAY = 1e-4
 """[m]: distances to boxes and planes, in single precision over a few metres."""
 

@@ -17,8 +17,8 @@ GAMMA = 1.0 - 1.0 / np.sqrt(2.0)
 
 def no_reference(world: World) -> str:
     """Why a world's drive law has no reference solution here; empty where it has."""
-    if any(joint.friction > 0 for joint in world.joints):
-        return "dry friction has no smooth law, so there is no reference solution"
+    if world.tendons or world.constraints or any(joint.friction > 0 for joint in world.joints):
+        return "dry friction has no smooth law, nor have tendons and constraints, so there is no reference solution"
     if any(a.mode is ControlMode.VELOCITY for a in world.actuators):
         return "the tape holds velocity drives still, so there is no reference solution"
     return ""

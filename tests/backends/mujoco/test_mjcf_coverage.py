@@ -37,7 +37,11 @@ WHOLE = """<mujoco><compiler angle="radian"/><asset>
     <body name="hand" pos="0 1 0" euler="0 0 0.1"><inertial pos="0 0 0" mass="1" fullinertia="0.1 0.2 0.25 0 0 0"/>
       <joint name="grip" springdamper="0.1 1" range="-2 2"/><geom name="nail" size="0.1"
     pos="0 0 1"/></body></body></body></worldbody>
-<equality><joint name="tie" joint1="grip" joint2="turn" polycoef="0 1 0 0 0" active="true"/></equality>
+<equality><weld body1="hand" body2="base" anchor="0 0 0.1" relpose="0 0 0 1 0 0 0" solref="0.03 1"/>
+  <joint name="tie" joint1="grip" joint2="turn" polycoef="0 1 0 0 0" active="true"/></equality>
+<tendon><fixed name="cord" stiffness="4" damping="1" springlength="0.1 0.2" range="-1 1"
+  limited="true" frictionloss="0.1" armature="0.1"
+  solreflimit="0.03 1"><joint joint="turn" coef="0.5"/><joint joint="grip" coef="2"/></fixed></tendon>
 <actuator><position name="p" joint="turn" kp="50" kv="5" gear="1" forcelimited="true" forcerange="-9 9"/>
   <general name="g" joint="grip" gaintype="fixed" gainprm="5" biastype="affine" biasprm="0 -5 -1" dyntype="none"
     ctrllimited="true"
@@ -52,7 +56,8 @@ axisangle: 0 1 1 1; euler: 1 1 0.1; contype: 0; conaffinity: 2; condim: 4; prior
 actuatorfrclimited: false; forcelimited: false; ctrllimited: false; active: false; gravcomp: 1; joint1: turn;
 joint2: grip; joint: hand; gaintype: affine; biastype: none; dyntype: integrator; shellinertia: true; axis: 0 1 0;
 pos: 0.1 0.2 0.3; refpos: 0.1 0.2 0.3; fromto: 0 0 0 0 1 1; stiffness: 3; polycoef: 0.1 2 0 0 0; ref: 0.3;
-nrow: 4; ncol: 1; elevation: 1 0 0 0.5; angle: degree; solreflimit: 0.06 1""".split(";")
+nrow: 4; ncol: 1; elevation: 1 0 0 0.5; angle: degree; solreflimit: 0.06 1; solref: 0.06 1;
+body1: arm; body2: arm; relpose: 0 0 0 0 1 0 0""".split(";")
     for key, value in [pair.split(":")]
 }
 """Other values than those of the model; numbers are scaled where there is none."""
@@ -69,7 +74,8 @@ def model_of(root: ElementTree.Element, folder: Path) -> str:
     fields = [(field.name, field.size, field.heights.tolist()) for field in model.heightfields]
     geoms = [(geom, None) for geom in model.geoms]
     meshes = [(mesh.name.rpartition("_")[0], mesh.vertices.tolist()) for mesh in model.meshes]
-    parts = (model.bodies, model.joints, geoms, model.sites, meshes, fields, model.actuator_hints, model.excluded_pairs)
+    held = (model.tendons, model.constraints, model.actuator_hints, model.excluded_pairs)
+    parts = (model.bodies, model.joints, geoms, model.sites, meshes, fields, held)
     return repr((*parts, [str(note) for note in model.report]))
 
 

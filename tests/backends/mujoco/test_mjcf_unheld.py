@@ -90,6 +90,11 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
         ("rest", '<actuator><position joint="turn" kp="1" delay="0.1" nsample="9"/></actuator>', "actuator delay: 0.1"),
         ("rest", '<equality><joint joint1="grip" active="false"/></equality>', "equality active: is inactive"),
         ("rest", '<equality><joint joint1="grip" joint2="turn" solref="0.1 1"/></equality>', "equality solref: 0.1 1"),
+        (
+            "rest",
+            '<equality><weld body1="arm" body2="base" torquescale="0.5"/></equality>',
+            "equality data: the torquescale of 0.5 is left out",
+        ),
         ("world", '<site name="goal"/>', "world: 1 sites of the world beside the model are left out"),
         ("base", 'mocap="true"', "body mocap: True is left out: it stays where it is"),
         ("rest", '<custom><numeric name="n" data="1"/></custom>', "numerics: are left out"),
@@ -223,6 +228,8 @@ def _change(element: object, field: str) -> None:
         setattr(element, field, np.where(np.isnan(value), 0.0, value) + 1)
     elif isinstance(value, bool):
         setattr(element, field, not value)
+    elif isinstance(value, mujoco.mjtLimited):
+        setattr(element, field, 1)
     elif isinstance(value, int | float):
         setattr(element, field, type(value)(2 if value != value else value + 2))
     elif isinstance(value, str):
@@ -296,17 +303,19 @@ TENDONS = """<tendon><fixed name="look"><joint joint="turn" coef="1"/></fixed>
 <fixed name="pull" stiffness="5" damping="1"><joint joint="grip" coef="1"/></fixed>
 <fixed name="stop" limited="true" range="0 1"><joint joint="turn" coef="1"/></fixed>
 <fixed name="haul"><joint joint="turn" coef="1"/></fixed>
-<fixed name="tied"><joint joint="grip" coef="1"/></fixed></tendon>
+<fixed name="tied"><joint joint="grip" coef="1"/></fixed>
+<spatial name="cord" stiffness="3"><site site="near"/><site site="far"/></spatial></tendon>
 <actuator><motor name="winch" tendon="haul"/></actuator><equality><tendon tendon1="tied"/></equality>"""
 
 
-def test_tendons_are_left_out_with_their_effect(load: Callable[..., ImportedModel]) -> None:
-    found = [str(note) for note in load(rest=TENDONS).report if note.where == "tendons"]
-    assert found == [
+def test_tendons_that_are_left_out_are_named_with_their_effect(load: Callable[..., ImportedModel]) -> None:
+    """Those of joints are in the model, but for one that only measures; one through space is left out."""
+    model = load(rest=TENDONS, world='<site name="near"/><site name="far" pos="1 0 0"/>')
+    assert [str(note) for note in model.report if note.where == "tendons"] == [
         "tendons: do nothing in the file either: they only measure (1: look) (info)",
-        "tendons: pull as springs, which is left out (1: pull) (dropped)",
-        "tendons: damp, which is left out (1: pull) (dropped)",
-        "tendons: limit a length, which is left out (1: stop) (dropped)",
-        "tendons: carry the force of drives, which is left out (1: haul) (dropped)",
-        "tendons: are tied to a length, which is left out (1: tied) (dropped)",
+        "tendons: pull as springs, which is left out: they are paths through space, and tendons here are sums of joint "
+        "positions (1: cord) (dropped)",
     ]
+    assert [tendon.name for tendon in model.tendons] == ["pull", "stop", "tied"]
+    assert (model.tendons[2].lower, model.tendons[2].upper) == (0.0, 0.0)
+    assert [hint.joint for hint in model.actuator_hints] == [0]

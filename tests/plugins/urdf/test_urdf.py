@@ -139,8 +139,8 @@ def test_mimic_chains_follow_their_leader(urdf: Load, inertial: Text) -> None:
     model = urdf(body)
     first, second, leader = model.joints
     assert leader.mimic is None
-    assert first.mimic == (2, 6.0, 2.5)
-    assert second.mimic == (2, 2.0, 0.5)
+    assert first.mimic == (2, 6.0, 2.5, ())
+    assert second.mimic == (2, 2.0, 0.5, ())
     assert (leader.initial, second.initial) == (0.2, 0.9)
     assert first.initial == pytest.approx(3.7)
 

@@ -89,12 +89,24 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_OUT, "emission metallic reflectance roughness shininess specular", "surfaces have plain colours"),
         Row(_IDLE, "texrepeat texuniform textures", "textures are left out with a note of their own"),
     ),
+    "tendon": (
+        Row(_EXACT, "path springlength range limited frictionloss armature", "of a fixed one"),
+        Row(_ABOUT, "stiffness damping", "the linear part of a polynomial, of a fixed one"),
+        Row(_ABOUT, "solref_limit", "its time constant"),
+        Row(_OUT, "solimp_limit", "limits are as soft as the engine has them"),
+        Row(_OUT, "margin", "limits act at the limit"),
+        Row(_OUT, "solref_friction solimp_friction", "dry friction is as stiff as the engine has it"),
+        Row(_OUT, "actfrclimited actfrcrange", "each drive has a limit of its own"),
+        Row(_OUT, "userdata", _NUMBERS),
+        Row(_IDLE, "material rgba width", "it is of how a tendon is drawn"),
+    ),
     "equality": (
         Row(_EXACT, "name1 name2"),
-        Row(_ABOUT, "type objtype", "that of joints becomes a mimic joint, the others are rows of their own"),
-        Row(_ABOUT, "data", "the linear part of the polynomial"),
+        Row(_ABOUT, "data", "all but the `torquescale` of a weld"),
+        Row(_ABOUT, "type objtype", "those of joints and of tendons of two joints become mimic joints"),
         Row(_ABOUT, "active", "one that is not is left out"),
-        Row(_OUT, "solref solimp", "followers are as stiff as the engine has them"),
+        Row(_ABOUT, "solref", "the time constant of a connect or weld; followers are as stiff as the engine has them"),
+        Row(_OUT, "solimp", "what is held is as stiff as the engine has it"),
     ),
     "actuator": (
         Row(_EXACT, "target forcelimited ctrllimited actdim actlimited actrange velrange ctrlspec gear"),
@@ -142,9 +154,12 @@ WHOLE: Mapping[str, Row] = {
     ),
     "exclude": Row(_ABOUT, "", "pairs of bodies, after those without a joint are joined to what carries them"),
     "ball": Row(_NOT, "", "as the `type` of a joint: there are hinges and slides"),
-    "connect weld": Row(_NOT, "", "where it is active: loops are not closed"),
+    "connect weld": Row(
+        _EXACT, "", "but for a weld's `torquescale`; one of a model that floats to the world is refused"
+    ),
     "flex flexvert flexstrain flexcomp edge elasticity contact pin": Row(_NOT, "", "flexes: bodies are rigid"),
-    "tendon fixed spatial pulley": Row(_OUT, "", "the report says what they do; one that only measures does nothing"),
+    "fixed": Row(_EXACT, "", "one that only measures does nothing, and is left out"),
+    "spatial pulley": Row(_OUT, "", "the report says what they do; one that only measures does nothing"),
     "general motor position velocity": Row(_ABOUT, "", _LAWS),
     "intvelocity orientation pid damper cylinder muscle adhesion dcmotor": Row(_OUT, "", _LAWS),
     "texture layer": Row(_OUT, "", "surfaces have plain colours"),
@@ -160,7 +175,9 @@ WHOLE: Mapping[str, Row] = {
     "flag": Row(_OUT, "", "they are MuJoCo's alone"),
     "size": Row(_IDLE, "", "memory is the engine's"),
     "visual global quality headlight map scale rgba statistic": Row(_IDLE, "", "it is of MuJoCo's own viewer"),
-    "mujoco worldbody asset equality actuator keyframe custom deformable user": Row(_IDLE, "", "it holds others"),
+    "mujoco worldbody asset tendon equality actuator keyframe custom deformable user": Row(
+        _IDLE, "", "it holds others"
+    ),
 }
 """The elements that have one fate as a whole. Everything below <sensor> shares that of it."""
 
@@ -204,6 +221,7 @@ ATTRIBUTES: Mapping[str, str] = MappingProxyType(
         "usertet": "",
         "needsdf": "",
         "textures": "texture",
+        "tendon.path": "fixed/joint fixed/coef",
         "equality.name1": "joint1 name class",
         "equality.name2": "joint2",
         "equality.objtype": "",

@@ -4,12 +4,13 @@ Rules where the neutral model is narrower; each use is a note in the report:
 - One kinematic tree, of several the one that is asked for: geoms of the world beside it, cameras, lights and sensors
   stay behind. A tree whose first body has hinges or slides gets a fixed base at the file's origin.
 - Bodies without a joint are lumped into their parent; the frame survives as a site, the inertia is composed exactly.
-- A body with several joints becomes a chain: each extra link takes a share of `VIRTUAL_SHARE` of its mass and inertia,
+- A body with several joints becomes a chain: each extra link takes a share of `JOINT_SHARE` of its mass and inertia,
   and the body still collides with neither its parent nor what it did not collide with.
 - Sites and bodies share their names here: a site that is called like a body is found as `<body>.<site>`.
 - Joint positions keep the file's zero, whatever its `ref`. A keyframe `home` gives the initial ones.
-- Joint equalities become mimics (the linear term). Tendons and drives that are no position, velocity or motor drive of
-  one joint are dropped. Ball joints, connect and weld equalities and flexes are refused.
+- Equalities of joints, and of tendons of two joints, become mimics, and a tendon of more is held. Spatial tendons, and
+  drives that are no position, velocity or motor drive of a joint or fixed tendon, are dropped. Ball joints and flexes
+  are refused.
 """
 
 from collections.abc import Collection
@@ -27,11 +28,11 @@ from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.kinematics import inertia
-from anysim.kinematics.inertia import VIRTUAL_SHARE
 from anysim.math import pose as P
 from anysim.model.hash import split, tidy
-from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
+from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Site
 from anysim_mujoco.inertia import full
+from anysim_mujoco.mjcf.couplings import Couplings
 from anysim_mujoco.mjcf.drives import drive_hint, left_out, shared
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
@@ -39,6 +40,9 @@ from anysim_mujoco.mjcf.pairs import PairReader
 from anysim_mujoco.mjcf.unheld import mixed, of_tendons
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+JOINT_SHARE, _LIGHTEST = 1e-6, 1e-13
+"""The share of a body's mass and inertia that a link gets for each of its joints but the last: a millionth, so that on
+MuJoCo a body goes within 1e-5 of its way, unless that would leave a moment [kg m^2] below the second number."""
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 
 
@@ -78,7 +82,7 @@ class _MjcfImport:
         for number in range(top, self.model.nbody):
             self._body(number, top)
         self._sites()
-        self._mimics()
+        couplings = self._couplings()
         self._inertials()
         geometry = self.geometry
         return ImportedModel(
@@ -91,10 +95,12 @@ class _MjcfImport:
             meshes=tuple(geometry.meshes.values()),
             heightfields=tuple(geometry.heightfields.values()),
             links=self.place,
-            actuator_hints=self._hints(),
+            actuator_hints=self._hints(couplings),
             excluded_pairs=PairReader(self.model, self.geometry, self.bodies, self.links, self.notes).excluded(
                 self.virtual
             ),
+            tendons=tuple(couplings.tendons()),
+            constraints=tuple(couplings.constraints()),
             report=tuple(self.notes),
         )
 
@@ -106,13 +112,6 @@ class _MjcfImport:
             if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
                 raise AssetError(
                     f"{self._joint_name(j)} of {self.path} is a ball joint; the neutral model has hinges and slides"
-                )
-        for e in range(model.neq):
-            kind = mujoco.mjtEq(int(model.eq_type[e]))
-            if model.eq_active0[e] and kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
-                word = kind.name.removeprefix("mjEQ_").lower()
-                raise AssetError(
-                    f"{self.path}: the equality '{model.eq(e).name or e}' is a {word}; closed loops are not supported"
                 )
         if model.nflex:
             raise AssetError(f"{self.path}: holds {model.nflex} flexes; the neutral model has rigid bodies")
@@ -189,12 +188,14 @@ class _MjcfImport:
 
     def _inertials(self) -> None:
         totals = [inertia.composed([part for part in parts if part.mass > 0]) for parts in self.inertials]
+        shares = {body: _share_of(totals[body]) for body in self.virtual.values()}
         for i, body in enumerate(self.bodies):
             total = totals[i]
             if i in self.virtual:
-                total = self._share(i, totals[self.virtual[i]])
-            elif shares := sum(whole == i for whole in self.virtual.values()):
-                total = inertia.scaled(total, 1.0 - shares * VIRTUAL_SHARE)
+                total = self._share(i, totals[self.virtual[i]], shares[self.virtual[i]])
+            elif i in shares:
+                count = sum(whole == i for whole in self.virtual.values())
+                total = inertia.scaled(total, 1.0 - count * shares[i])
             if body.kind is not BodyKind.STATIC:
                 total, text = inertia.repaired(total)
                 if text is not None:
@@ -202,14 +203,14 @@ class _MjcfImport:
                 total = inertia.moving(total)
             self.bodies[i] = replace(body, inertial=total)
 
-    def _share(self, virtual: int, whole: Inertial) -> Inertial:
+    def _share(self, virtual: int, whole: Inertial, share: float) -> Inertial:
         """The inertial of an extra link of a body that has this one: as the body lies at the file's zero."""
         pose, body = _IDENTITY, self.virtual[virtual]
         for link in range(virtual + 1, body + 1):
             pose = P.compose(pose, P.pose(self.bodies[link].position, self.bodies[link].quaternion))
-        text = f"stands for one of the joints of '{self.bodies[body].name}', and takes {VIRTUAL_SHARE:g} of its mass"
-        self._note("repaired", self.bodies[virtual].name, f"{text}: {VIRTUAL_SHARE * whole.mass:.3g} kg")
-        return inertia.moved(inertia.scaled(whole, VIRTUAL_SHARE), pose)
+        text = f"stands for one of the joints of '{self.bodies[body].name}', and takes {share:g} of its mass"
+        self._note("repaired", self.bodies[virtual].name, f"{text}: {share * whole.mass:.3g} kg")
+        return inertia.moved(inertia.scaled(whole, share), pose)
 
     def _sites(self) -> None:
         model, taken = self.model, {*self.links, *(body.name for body in self.bodies)}
@@ -269,37 +270,33 @@ class _MjcfImport:
             spring_rest=float(model.qpos_spring[model.jnt_qposadr[j]]) * unit if model.jnt_stiffness[j] else 0.0,
         )
 
-    def _mimics(self) -> None:
-        model = self.model
-        for e in range(model.neq):
-            if model.eq_type[e] != mujoco.mjtEq.mjEQ_JOINT or not model.eq_active0[e]:
-                continue
-            follower, leader = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-            name = self._joint_name(follower)
-            if leader < 0:
-                raise AssetError(f"{self.path}: an equality holds joint '{name}' still; leave the joint out instead")
-            a0, a1, *curved = (float(v) for v in model.eq_data[e, :5])
-            if any(curved):
-                self._note(
-                    "dropped", name, f"follows '{self._joint_name(leader)}' by a polynomial; its linear part is kept"
-                )
-            q0 = [float(model.qpos0[model.jnt_qposadr[j]]) for j in (follower, leader)]
-            multiplier = a1 * self._unit(follower) / self._unit(leader)
-            offset = (a0 + q0[0] - a1 * q0[1]) * self._unit(follower)
-            target, own = self.number[leader], self.number[follower]
-            start = multiplier * self.joints[target].initial + offset
-            self.joints[own] = replace(self.joints[own], mimic=Mimic(target, multiplier, offset), initial=start)
+    def _couplings(self) -> Couplings:
+        """Tendons and constraints; joints that follow others are told so."""
+        floating = self.bodies[0].kind is BodyKind.FREE
+        couplings = Couplings(self.model, self.scale, self.number, self._unit, self.frames, floating)
+        try:
+            for follower, mimic in couplings.following():
+                start = mimic.position(self.joints[mimic.joint].initial)
+                self.joints[follower] = replace(self.joints[follower], mimic=mimic, initial=start)
+        except AssetError as error:
+            raise AssetError(f"{self.path}: {error}") from None
+        for e in range(self.model.neq):
+            if self.model.eq_active0[e] and self.model.eq_type[e] == mujoco.mjtEq.mjEQ_TENDON:
+                if why := couplings.untied(e):
+                    self._note("dropped", f"equality '{self.model.eq(e).name or e}'", f"{why}, and is left out")
+        return couplings
 
     # ------------------------------------------------------------------ drives
 
-    def _hints(self) -> tuple[ActuatorHint, ...]:
-        hints = []
-        for a in range(self.model.nu):
-            hint, why = drive_hint(self.model, a, self.number, self._unit)
+    def _hints(self, couplings: Couplings) -> tuple[ActuatorHint, ...]:
+        model, hints = self.model, []
+        tendon = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+        for a in sorted(range(model.nu), key=lambda a: bool(tendon[a])):  # joints that a drive has alone come first
+            hint, why = drive_hint(model, a, self.number, self._unit, couplings, {one.joint for one in hints})
             if hint is not None:
                 hints.append(hint)
-            for text in (why,) if hint is None else left_out(self.model, a, hint):
-                self._note("dropped", f"actuator '{self.model.actuator(a).name or a}'", text)
+            for text in (why,) if hint is None else left_out(model, a, hint):
+                self._note("dropped", f"actuator '{model.actuator(a).name or a}'", text)
         for joint in shared(hints):
             self._note("dropped", self.joints[joint].name, "has several drives in its file; none of them is used")
         return tuple(hints)
@@ -320,3 +317,9 @@ def _free(name: str, taken: Collection[str]) -> str:
         count += 1
         free = f"{name}_{count}"
     return free
+
+
+def _share_of(whole: Inertial) -> float:
+    """The share of a body that each of its extra links gets."""
+    least = float(inertia.principal(whole.inertia)[0].min()) if whole.mass > 0 else 0.0
+    return min(1e-3, max(JOINT_SHARE, _LIGHTEST / least)) if least > 0 else JOINT_SHARE

@@ -31,6 +31,11 @@ PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
     ("joint", "actfrcrange"): lambda joint: _lopsided(joint.actfrcrange),
     ("actuator", "forcerange"): lambda drive: _lopsided(drive.forcerange),
     ("actuator", "ctrlrange"): lambda drive: _lopsided(drive.ctrlrange) if _motor(drive) else "",
+    ("tendon", "damping"): lambda tendon: _polynomial(tendon, "damping"),
+    ("tendon", "stiffness"): lambda tendon: _polynomial(tendon, "stiffness"),
+    ("tendon", "solref_limit"): lambda tendon: _solref(tendon.solref_limit),
+    ("equality", "data"): lambda tie: _torque(tie),
+    ("equality", "solref"): lambda tie: _held(tie),
     ("equality", "active"): lambda tie: "" if tie.active else "is inactive, and left out",
     ("key", "qpos"): lambda key: "" if key.name == "home" else "are not kept: only the keyframe 'home' is",
 }
@@ -43,6 +48,7 @@ _CONDIM = {
     1: "contacts have friction where either surface has: a frictionless one is `friction: 0`",
     6: "rolling friction is not simulated on every engine",
 }
+_SPATIAL = ", which is left out: they are paths through space, and tendons here are sums of joint positions"
 _EARLY = ("texture", "skin", "material", "camera", "light")
 
 
@@ -162,16 +168,23 @@ def _named(elements: list[Any], effect: str) -> str:
 
 
 def of_tendons(model: Any) -> Iterator[ImportNote]:
-    """Notes of the tendons of a compiled file: what each would do, which is left out; most only measure."""
+    """Notes of the tendons of a compiled file: what spatial ones would do, which is left out; most only measure."""
     told: dict[str, list[Any]] = {}
     for t in range(model.ntendon):
+        if is_fixed(model, t) and tendon_effects(model, t):
+            continue
         for effect in tendon_effects(model, t) or ["do nothing in the file either: they only measure"]:
             told.setdefault(effect, []).append(model.tendon(t))
     for effect, ones in told.items():
         idle = "nothing" in effect
-        yield ImportNote(
-            "info" if idle else "dropped", "tendons", _named(ones, effect + ", which is left out" * (not idle))
-        )
+        yield ImportNote("info" if idle else "dropped", "tendons", _named(ones, effect + _SPATIAL * (not idle)))
+
+
+def is_fixed(model: Any, t: int) -> bool:
+    """Whether tendon `t` of a compiled file is a sum of joint positions, not a path through space."""
+    first = int(model.tendon_adr[t])
+    kinds = model.wrap_type[first : first + int(model.tendon_num[t])]
+    return bool(np.all(kinds == int(mujoco.mjtWrap.mjWRAP_JOINT)))
 
 
 def tendon_effects(model: Any, t: int) -> list[str]:
@@ -203,6 +216,19 @@ def _solref(value: Any) -> str:
     if value[0] <= 0:
         return f"{value[0]:g} {value[1]:g} is a stiffness and a damping, and left out"
     return "" if value[1] == 1.0 else f"the damping ratio of {value[1]:g} is left out"
+
+
+def _torque(tie: Any) -> str:
+    scale = float(tie.data[10])
+    welds = tie.type == mujoco.mjtEq.mjEQ_WELD
+    return f"the torquescale of {scale:g} is left out" if welds and scale != 1.0 else ""
+
+
+def _held(tie: Any) -> str:
+    kind, told = tie.type, value_of(tie, "solref")
+    if kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_TENDON):
+        return _solref(tie.solref)
+    return _left_out("equality", "solref", told)
 
 
 def _whole(joint: Any, field: str) -> str:
