@@ -86,6 +86,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "env_policies": "expert random zero",
     },
     "anysim-export": {"commands": "export tape", "exporters": "lerobot rerun rlds-ready robomimic webdataset"},
+    "anysim-export-model": {"commands": "export-model"},
     "anysim-film": {"commands": "render"},
     "anysim-inspect": {"commands": "audit check doctor explain list replay snapshot verify"},
     "anysim-language": {"commands": "describe vqa", "streams": "language", "vocabularies": "english"},

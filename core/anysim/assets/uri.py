@@ -307,7 +307,6 @@ def _nearest(path: Path, root: Path) -> str:
                 break
     ancestor = next((p for p in path.parents if p.is_dir()), root)
     if ancestor.is_dir() and ancestor.is_relative_to(root):
-        missing = path.relative_to(ancestor).parts[0]
         children = sorted(p.name for p in ancestor.iterdir())
-        return f"{suggest(missing, children)}; {ancestor} has {listing(children, 8)}"
+        return f"{suggest(path.relative_to(ancestor).parts[0], children)}; {ancestor} has {listing(children, 8)}"
     return ""
