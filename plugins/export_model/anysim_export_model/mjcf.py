@@ -99,6 +99,8 @@ class _Mjcf:
         for index, body in enumerate(model.bodies):
             parent = self.world if index == 0 else elements[body.parent]
             place = (piece.position, piece.quaternion) if index == 0 else (body.position, body.quaternion)
+            if self.alone and body.name == "world":
+                self.notes.changed("body", f"is called '{full(body.name)}': MuJoCo's own has its name", body.name)
             element = sub(parent, "body", name=full(body.name), pos=numbers(place[0]), quat=_quat(place[1]))
             elements.append(element)
             if body.gravity_compensation:

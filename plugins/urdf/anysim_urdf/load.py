@@ -55,6 +55,13 @@ def import_urdf(
     return _UrdfImport(UrdfFile(path), root, scale, packages, visual_error).run()
 
 
+def import_expanded(
+    path: Path, expanded: Path, *, root: Path, scale: float, packages: Mapping[str, Path], visual_error: float
+) -> ImportedModel:
+    """Read `expanded`, a URDF file that was made of `path`, which is what its references are relative to."""
+    return _UrdfImport(UrdfFile(path, expanded), root, scale, packages, visual_error).run()
+
+
 class _UrdfImport:
     """One import: walks the tree once, depth first, children in source order."""
 

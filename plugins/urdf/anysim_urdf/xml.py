@@ -79,11 +79,14 @@ class JointElement(NamedTuple):
 
 
 class UrdfFile:
-    """The links and joints of a URDF file, in its order."""
+    """The links and joints of a URDF file, in its order.
 
-    def __init__(self, path: Path) -> None:
+    Of a xacro file `expanded` is what xacro made of it: lines are those of that.
+    """
+
+    def __init__(self, path: Path, expanded: Path | None = None) -> None:
         self.path = path
-        root = self._tree()
+        root = self._tree(expanded or path)
         self._lines: dict[tuple[str, str], int] = {}
         self._materials: dict[str, Rgba] = {}
         self._expanded(root)
@@ -110,8 +113,8 @@ class UrdfFile:
 
     # ------------------------------------------------------------------ the file
 
-    def _tree(self) -> Any:
-        root, _ = xml_root(self.path)
+    def _tree(self, read: Path) -> Any:
+        root, _ = xml_root(read)
         if root.tag != "robot":
             raise AssetError(f"{self.path}: a URDF has the root element <robot>, this one has <{root.tag}>")
         return root
@@ -121,7 +124,7 @@ class UrdfFile:
             for key, value in element.attrib.items():
                 if "$(" in value or "${" in value:
                     text = f'<{element.tag} {key}="{value}"> is an expression of xacro or roslaunch'
-                    raise self._error(element, f"{text} that was not expanded; run xacro on the source first")
+                    raise self._error(element, f"{text} that was not expanded; name the .xacro file itself")
 
     def _named_once(self, kind: str, elements: list[Any]) -> None:
         for element in elements:
@@ -269,5 +272,5 @@ def _instead(tags: list[str]) -> str:
     if "deformable" in tags:
         return "it is a deformable body of PyBullet, and the neutral model has rigid ones"
     if any("xacro" in tag for tag in tags):
-        return "it is a xacro source, which needs to be expanded first"
+        return "it is a xacro source: call the file NAME.xacro"
     return f"it holds {listing(dict.fromkeys(f'<{tag}>' for tag in tags), 6)}"

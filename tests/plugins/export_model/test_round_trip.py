@@ -109,6 +109,8 @@ def differences(one: ImportedModel, other: ImportedModel, *, velocities: bool = 
     frames = 0.0
     for at in (np.zeros(len(ends)), np.array([rng.uniform(*sorted(pair)) for pair in ends])):
         before, after = poses(one, at), poses(other, at)
+        before["world (body)"] = before.pop("world", before[one.bodies[0].name])  # as MJCF has to call it
+        after.setdefault("world (body)", after.get("world", after[other.bodies[0].name]))
         assert before.keys() <= after.keys(), before.keys() - after.keys()
         frames = max([frames, *(difference(before[name], after[name]) for name in before)])
     limits = [
