@@ -104,4 +104,4 @@ def test_a_description_comes_from_the_cache_and_never_from_a_network(
     assert made.name == "two_description"
     assert 'source: "robot_descriptions:two_description"' in made.text(tmp_path)
     for name in [name for name in sys.modules if name.partition(".")[0] == "robot_descriptions"]:
-        monkeypatch.delitem(sys.modules, name)
+        del sys.modules[name]
