@@ -107,7 +107,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-skills": {"skills": "pick"},
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},
     "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
-    "anysim-urdf": {"importers": "urdf xacro"},
+    "anysim-urdf": {"importers": "sdf urdf world xacro"},
     "anysim-viewer": {"commands": "view", "views": "page"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {

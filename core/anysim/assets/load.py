@@ -66,7 +66,7 @@ def import_asset(
         own: dict[str, object] = {"body": file.body} if file.body else {"params": params} if params else {}
         if params and file.kind != "xacro":
             raise AssetError(f"asset '{uri}': `params` are for xacro files and builders; this is a {file.kind} file")
-        if file.kind in ("urdf", "xacro"):
+        if file.kind in ("urdf", "xacro", "sdf", "world"):
             own |= {"packages": {name: locate_folder(folder, base=base).path for name, folder in packages.items()}}
         importer = registry.load("importers", file.kind)
         with registry.using("importers", file.kind):

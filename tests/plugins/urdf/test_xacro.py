@@ -53,7 +53,7 @@ SYSTEM = (
 REFUSED = {
     '<xacro:include filename="/etc/passwd"/>': "'/etc/passwd', which leaves its folders",
     '<xacro:include filename="../../../../etc/*"/>': "which leaves its folders",
-    '<xacro:property name="x" value="${xacro.load_yaml(\'/etc/hostname\')}"/>': "leaves its folders",
+    "<link name=\"${xacro.load_yaml('/etc/hostname')}\"/>": "leaves its folders",
     f'<link name="${{{SYSTEM}}}"/>': "would do what no model needs",
     '<link name="$(env HOME)"/>': "'HOME' is not set",
     '<link name="${len(list(range(10**9)))}"/>': "cannot expand it",
