@@ -8,12 +8,12 @@ The figures of the models are those of docs/models.json, which `python benchmark
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from generated import ROOT, main
 
 from anysim_mujoco.mjcf import coverage as mjcf
-from anysim_urdf import coverage as urdf
+from anysim_urdf import coverage as urdf, sdf_coverage as sdf
 
 
 def table(rows: Iterable[tuple[str, str, str, str]]) -> str:
@@ -40,6 +40,8 @@ def models() -> str:
 
 
 if __name__ == "__main__":
-    tables = {"URDF": lambda: table(urdf.rows()), "MJCF": lambda: table(mjcf.rows()), "models": models}
+    tables = {"URDF": urdf.rows, "SDF": sdf.rows, "MJCF": mjcf.rows}
+    contents: dict[str, Callable[[], str]] = {name: lambda rows=rows: table(rows()) for name, rows in tables.items()}
+    contents["models"] = models
     page = ("docs/importing.md",)
-    sys.exit(max(main(__doc__, name, "importing_table.py", page, content) for name, content in tables.items()))
+    sys.exit(max(main(__doc__, name, "importing_table.py", page, content) for name, content in contents.items()))

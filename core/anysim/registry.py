@@ -86,6 +86,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "env_policies": "expert random zero",
     },
     "anysim-export": {"commands": "export tape", "exporters": "lerobot rerun rlds-ready robomimic webdataset"},
+    "anysim-export-model": {"commands": "export-model"},
     "anysim-film": {"commands": "render"},
     "anysim-inspect": {"commands": "audit check doctor explain list replay snapshot verify"},
     "anysim-language": {"commands": "describe vqa", "streams": "language", "vocabularies": "english"},
@@ -106,7 +107,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-skills": {"skills": "pick"},
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},
     "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
-    "anysim-urdf": {"importers": "urdf"},
+    "anysim-urdf": {"importers": "sdf urdf world xacro"},
     "anysim-viewer": {"commands": "view", "views": "page"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {

@@ -105,10 +105,12 @@ class PartSpec(Spec):
     """Another model fixed to a link: a gripper on an arm, an arm on a base."""
 
     source: str = Field(
-        description="URI of the part's URDF or MJCF file, `FILE.xml#BODY` for one of several bodies, or `procedural:` "
-        "with a builder"
+        description="URI of the part's URDF, xacro, SDF or MJCF file, `FILE.xml#BODY` for one of several bodies, or "
+        "`procedural:` with a builder"
     )
-    params: dict[str, Any] = Field(default_factory=dict, description="parameters of a procedural source")
+    params: dict[str, Any] = Field(
+        default_factory=dict, description="parameters of a procedural source, or arguments of a xacro"
+    )
     link: str = Field(description="the link that carries it")
     position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place of the part's root in that link's frame [m]")
     roll_pitch_yaw: Vec3 = Field(default=(0.0, 0.0, 0.0), description="orientation in that link's frame [rad]")
@@ -156,10 +158,12 @@ class RobotModelSpec(Spec):
     name: Name = Field(description="the name in the catalogue")
     description: str = Field(description="one line for people")
     source: str = Field(
-        description="URI of the URDF or MJCF file, `FILE.xml#BODY` for one of several bodies, or `procedural:` with a "
-        "builder"
+        description="URI of the URDF, xacro, SDF or MJCF file, `FILE.xml#BODY` for one of several bodies, or "
+        "`procedural:` with a builder"
     )
-    params: dict[str, Any] = Field(default_factory=dict, description="parameters of a procedural source")
+    params: dict[str, Any] = Field(
+        default_factory=dict, description="parameters of a procedural source, or arguments of a xacro"
+    )
     packages: dict[str, str] = Field(default_factory=dict, description=PACKAGES)
     visual_error: NonNegative | None = Field(
         default=None,

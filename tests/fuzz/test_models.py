@@ -19,7 +19,7 @@ from anysim_schemas.run import WorldSpec
 from tests.fuzz.budget import Tally
 
 pytestmark = pytest.mark.full
-COUNTS = {"urdf": 2500, "mjcf": 2500}
+COUNTS = {"urdf": 2500, "mjcf": 2500, "sdf": 20_000}
 
 URDF = """<?xml version="1.0"?>
 <robot name="arm"><material name="steel"><color rgba="0.5 0.5 0.5 1"/></material>
@@ -73,7 +73,36 @@ MJCF = """<mujoco model="arm"><compiler angle="degree" autolimits="true"/><optio
   <general tendon="both" biastype="affine" biasprm="0 -10 -1" gainprm="10"/></actuator>
 <sensor><jointpos joint="turn"/></sensor><keyframe><key name="home" qpos="0.1 0 0.02 0.02"/></keyframe></mujoco>
 """
-TEXTS = {"urdf": URDF, "mjcf": MJCF}
+SDF = """<sdf version="1.9"><model name="arm" canonical_link="base"><pose>0 0 1 0 0 0</pose><static>false</static>
+<frame name="mount" attached_to="base"><pose relative_to="base">0 0 0.5 0 0.1 0</pose></frame>
+<link name="base"><inertial><pose>0 0 0.1 0 0 0</pose><mass>4</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz>
+  </inertia></inertial><visual name="v"><geometry><mesh><uri>tetra.obj</uri><scale>1 1 1</scale></mesh></geometry>
+  <material><diffuse>1 0 0 1</diffuse></material><transparency>0.5</transparency></visual>
+  <collision name="c"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision></link>
+<link name="upper"><pose relative_to="turn">0.1 0 0 0 0 0</pose><gravity>false</gravity><inertial><mass>1</mass>
+  <inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>
+  <collision name="c"><pose relative_to="mount"/>
+  <geometry><mesh><uri>model://parts/tetra.stl</uri></mesh></geometry><surface><bounce/></surface></collision></link>
+<joint name="turn" type="revolute"><pose relative_to="mount" degrees="true">0 0.1 0 0 90 0</pose><parent>base</parent>
+  <child>upper</child><axis><xyz expressed_in="mount">0 0 1</xyz><limit><lower>-1</lower><upper>1</upper>
+  <effort>20</effort><velocity>2</velocity></limit><dynamics><damping>0.3</damping><friction>0.1</friction>
+  <spring_stiffness>2</spring_stiffness></dynamics></axis></joint>
+<link name="finger"><pose relative_to="upper">0 0 0.2 0 0 0</pose><inertial><mass>0.1</mass><inertia><ixx>1e-4</ixx>
+  <iyy>1e-4</iyy><izz>1e-4</izz></inertia></inertial><collision name="c"><geometry><sphere><radius>0.01</radius>
+  </sphere></geometry></collision></link>
+<joint name="left" type="prismatic"><parent>upper</parent><child>finger</child><axis><xyz>1 0 0</xyz><limit>
+  <lower>0</lower><upper>0.04</upper></limit>
+  <mimic joint="turn"><multiplier>0.02</multiplier><offset>0.01</offset></mimic></axis>
+  </joint>
+<model name="tool" placement_frame="grip"><pose relative_to="upper">0 0 0.3 0 0 0</pose><link name="body"><inertial>
+  <mass>0.2</mass></inertial></link><frame name="grip"><pose>0 0 0.1 0 0 0</pose></frame></model>
+<include><uri>model://parts</uri><name>bolt</name><pose>0 0 0.1 0 0 0</pose></include>
+<joint name="hold" type="fixed"><parent>upper</parent><child>tool</child></joint>
+<joint name="tie" type="fixed"><parent>tool::body</parent><child>bolt</child></joint>
+<plugin name="p" filename="x.so"/></model></sdf>
+"""
+PART = '<sdf version="1.9"><model name="part"><link name="piece"/></model></sdf>'
+TEXTS = {"urdf": URDF, "mjcf": MJCF, "sdf": SDF}
 CORNERS = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)]
 FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 
@@ -115,6 +144,21 @@ def pick(rng: np.random.Generator, of: Sequence[T]) -> T:
 
 def _attributes(root: Any) -> list[tuple[Any, str]]:
     return [(element, key) for element in root.iter("*") for key in element.attrib]
+
+
+def _another_text(root: Any, rng: np.random.Generator) -> None:
+    """Another text of an element that has one, as those of SDF; else another value."""
+    elements = [element for element in root.iter("*") if (element.text or "").strip()]
+    if not elements:
+        return _another_value(root, rng)
+    element = pick(rng, elements)
+    parts = element.text.split()
+    if re.fullmatch(r"[-+.\de\s]+", element.text) and rng.random() < 0.7:
+        parts[rng.integers(len(parts))] = pick(rng, NUMBERS)
+        element.text = " ".join(parts)
+    else:
+        element.text = pick(rng, [*WORDS, *NUMBERS, *FILES, pick(rng, elements).text])
+    return None
 
 
 def _another_value(root: Any, rng: np.random.Generator) -> None:
@@ -170,8 +214,11 @@ def mutated(text: str, number: int) -> bytes:
     """The file of a number: one to four changes of the tree, and of one in five of the text as well."""
     rng = np.random.default_rng(number)
     root = etree.fromstring(text.encode())
+    texts = (_another_text,) * 4 if root.tag == "sdf" else ()
     for _ in range(pick(rng, [1, 1, 2, 4])):
-        pick(rng, TREE)(root, rng)
+        if not len(root):  # all that could change is gone
+            break
+        pick(rng, (*TREE, *texts))(root, rng)
     data = etree.tostring(root)
     if rng.random() < 0.8:
         return data
@@ -201,6 +248,7 @@ def test_every_model_file_is_read_or_refused(kind: str, tmp_path: Path, monkeypa
     (folder / "tetra.obj").write_text("\n".join(lines))
     facets = [f"facet normal 0 0 1\nouter loop\n{_vertices(face)}\nendloop\nendfacet\n" for face in FACES]
     (folder / "parts" / "tetra.stl").write_text(f"solid t\n{''.join(facets)}endsolid t\n")
+    (folder / "parts" / "model.sdf").write_text(PART)
     file = folder / f"model.{'xml' if kind == 'mjcf' else kind}"
 
     def imported(data: bytes, fixed: bool) -> None:

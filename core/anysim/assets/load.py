@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from anysim import registry
 from anysim.assets.bounded_files import bounded
@@ -24,14 +24,14 @@ from anysim_schemas.limits import MODEL_BYTES
 from anysim_schemas.object_source import PROCEDURAL
 
 _FORMATS = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}  # other endings are importers' names
-_WITH_BODY = re.compile(r"(robot_descriptions:\w+|.*\.(?:urdf|xml|mjcf))#(.+)", re.IGNORECASE | re.DOTALL)
+_WITH_BODY = re.compile(r"(robot_descriptions:\w+|.*\.(?:urdf|xml|mjcf|sdf|world))#(.+)", re.IGNORECASE | re.DOTALL)
 """A `#` inside of a path is none that names a body."""
 
 
 class ModelFile(NamedTuple):
     """A file that holds a model, the folder that no reference in it may leave, its format, and the body that is meant.
 
-    `kind` is the name of its importer. `body` is empty where the whole file is meant, as it is of all but MJCF files.
+    `kind` is the name of its importer. `body` is empty where the whole file is meant, as it is of all but MJCF and SDF.
     """
 
     path: Path
@@ -47,32 +47,33 @@ def import_asset(
     scale: float = 1.0,
     packages: Mapping[str, str] = MappingProxyType({}),
     visual_error: float = VISUAL_ERROR,
+    params: Mapping[str, Any] = MappingProxyType({}),
 ) -> ImportedModel:
     """The model behind a URI: `.xml` is read by the installed importer `mjcf`, others by that of their ending's name.
 
     `procedural:NAME` is built by the installed builder, with its default parameters. `packages` are the folders, as
-    URIs, of packages that a URDF refers to as `package://NAME/…`. `visual_error` [m] is how far its looks may be off.
+    URIs, of what a URDF or xacro calls `package://NAME/…`, `params` the arguments of a xacro, and `visual_error` [m] is
+    how far its looks may be off.
 
     Raises:
         AssetError: see `model_file`, `anysim.assets.uri.locate_folder` and the importers; a number that is none.
         PluginError: no importer for the format is installed.
     """
-    model = _read(uri, base, scale, packages, visual_error)
+    if uri.startswith(PROCEDURAL):
+        model = from_uri(uri, scale=scale)
+    else:
+        file = model_file(uri, base=base)
+        own: dict[str, object] = {"body": file.body} if file.body else {"params": params} if params else {}
+        if params and file.kind != "xacro":
+            raise AssetError(f"asset '{uri}': `params` are for xacro files and builders; this is a {file.kind} file")
+        if file.kind in ("urdf", "xacro", "sdf", "world"):
+            own |= {"packages": {name: locate_folder(folder, base=base).path for name, folder in packages.items()}}
+        importer = registry.load("importers", file.kind)
+        with registry.using("importers", file.kind):
+            model = importer(file.path, root=file.root, scale=scale, visual_error=visual_error, **own)
     if found := strange_number(model):
         raise AssetError(f"{uri}: {found}; write a finite number (limits may be infinite)")
     return model
-
-
-def _read(uri: str, base: Path | None, scale: float, packages: Mapping[str, str], visual_error: float) -> ImportedModel:
-    if uri.startswith(PROCEDURAL):
-        return from_uri(uri, scale=scale)
-    file = model_file(uri, base=base)
-    own: dict[str, object] = {"body": file.body} if file.kind == "mjcf" else {}
-    if file.kind == "urdf":
-        own = {"packages": {name: locate_folder(folder, base=base).path for name, folder in packages.items()}}
-    importer = registry.load("importers", file.kind)
-    with registry.using("importers", file.kind):
-        return importer(file.path, root=file.root, scale=scale, visual_error=visual_error, **own)
 
 
 def split_body(uri: str) -> tuple[str, str]:

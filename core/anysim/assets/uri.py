@@ -19,6 +19,7 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from importlib import metadata
+from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -33,8 +34,6 @@ EXAMPLE_ROBOT_DATA = "example-robot-data"
 SCHEMES = (EXAMPLE_ROBOT_DATA, "package", "robot_descriptions", "file")
 _MODEL_FOLDERS = frozenset({"urdf", "robots", "xml", "mjcf", "xacro"})
 _SEARCHED = 5000  # files looked at for a near name in an error message
-
-
 Folders = dict[str, list[tuple[Path, Path]]]
 """Of packages by name: what no file of it may leave, and a folder where it may lie."""
 
@@ -125,7 +124,7 @@ def resolve_reference(
 ) -> Path:
     """The file that a mesh reference in the URDF or MJCF `file` stands for.
 
-    `package://NAME/rest` (and `model://`) is a file of the package NAME, and of no other: see `_folders_of_package`.
+    `package://NAME/rest` (and `model://`) is a file of the package NAME, and of no other: see `package_folders`.
     All else is relative to the file. `asked_by` names what asks, as in `link 'panda_hand' of panda.urdf`, `packages`
     the folders of packages by name. `found` keeps where packages lie for the next reference in the same file.
 
@@ -144,7 +143,7 @@ def resolve_reference(
         package, _, tail = rest.lstrip("/").partition("/")  # package:///NAME/rest is met, too
         found = {} if found is None else found
         if package not in found:
-            found[package] = _folders_of_package(package, file.resolve(), root, packages)
+            found[package] = package_folders(package, file.resolve(), root, packages)
         folders = found[package]
         candidates = [(limit, folder / tail) for limit, folder in folders if folder.is_dir()]
         if not candidates:
@@ -184,7 +183,7 @@ def example_robot_data() -> Path:
     return folder.resolve()
 
 
-def _folders_of_package(name: str, file: Path, root: Path, packages: Mapping[str, Path]) -> list[tuple[Path, Path]]:
+def package_folders(name: str, file: Path, root: Path, packages: Mapping[str, Path]) -> list[tuple[Path, Path]]:
     """Where the package `name` may lie, and what no file of it may leave: the first that is there counts.
 
     What `packages` says; the pip package example-robot-data; a folder from the file's own up to `root` that is called
@@ -300,14 +299,11 @@ def _nearest(path: Path, root: Path) -> str:
     if near:
         return f"; did you mean '{folded[near[0]]}' in the same folder?"
     if root.is_dir() and path.name:
-        for count, candidate in enumerate(root.rglob(glob.escape(path.name))):
+        for candidate in islice(root.rglob(glob.escape(path.name)), _SEARCHED):
             if candidate.is_file():
                 return f"; the nearest file is {candidate}"
-            if count > _SEARCHED:
-                break
     ancestor = next((p for p in path.parents if p.is_dir()), root)
     if ancestor.is_dir() and ancestor.is_relative_to(root):
-        missing = path.relative_to(ancestor).parts[0]
         children = sorted(p.name for p in ancestor.iterdir())
-        return f"{suggest(missing, children)}; {ancestor} has {listing(children, 8)}"
+        return f"{suggest(path.relative_to(ancestor).parts[0], children)}; {ancestor} has {listing(children, 8)}"
     return ""

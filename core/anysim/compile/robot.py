@@ -82,7 +82,8 @@ def _read(
     try:
         if source.startswith(PROCEDURAL):
             return build(source.removeprefix(PROCEDURAL), params)
-        return import_asset(source, base=entry.file.parent, packages=entry.spec.packages, visual_error=visual_error)
+        more: Any = {"packages": entry.spec.packages, "visual_error": visual_error, "params": params}
+        return import_asset(source, base=entry.file.parent, **more)
     except SpecError as error:
         raise AssetError(f"{where} is not valid: {error}") from None
 

@@ -17,7 +17,7 @@ from anysim.model.hash import split
 from anysim.model.world import Box, Capsule, Cylinder, Geom, Mesh, MeshShape, Quat, Shape, Sphere, Vec3
 from anysim_schemas.limits import ASSET_BYTES
 from anysim_urdf import xml as urdf_xml
-from anysim_urdf.xml import LinkElement, UrdfFile
+from anysim_urdf.xml import LinkElement, ModelElements
 
 _GREY = (0.7, 0.7, 0.7, 1.0)
 
@@ -30,7 +30,7 @@ class GeometryReader:
 
     def __init__(
         self,
-        file: UrdfFile,
+        file: ModelElements,
         root: Path,
         scale: float,
         packages: Mapping[str, Path],

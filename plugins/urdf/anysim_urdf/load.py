@@ -32,7 +32,7 @@ from anysim.math import matrix as M, pose as P
 from anysim.model.hash import split, tidy
 from anysim.model.world import FAR, Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
 from anysim_urdf.geometry import GeometryReader
-from anysim_urdf.xml import InertialElement, JointElement, UrdfFile
+from anysim_urdf.xml import InertialElement, JointElement, ModelElements, UrdfFile
 
 _LIMIT_SLACK = 1e-3  # [rad] or [m] that limits of followers and leaders may differ by, from rounding
 _TYPES = {"revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC}
@@ -55,11 +55,25 @@ def import_urdf(
     return _UrdfImport(UrdfFile(path), root, scale, packages, visual_error).run()
 
 
+def import_expanded(
+    path: Path, expanded: Path, *, root: Path, scale: float, packages: Mapping[str, Path], visual_error: float
+) -> ImportedModel:
+    """Read `expanded`, a URDF file that was made of `path`, which is what its references are relative to."""
+    return _UrdfImport(UrdfFile(path, expanded), root, scale, packages, visual_error).run()
+
+
+def imported(
+    file: ModelElements, *, root: Path, scale: float, packages: Mapping[str, Path], visual_error: float
+) -> ImportedModel:
+    """The model of links and joints that some reader has found."""
+    return _UrdfImport(file, root, scale, packages, visual_error).run()
+
+
 class _UrdfImport:
     """One import: walks the tree once, depth first, children in source order."""
 
     def __init__(
-        self, file: UrdfFile, root: Path, scale: float, packages: Mapping[str, Path], visual_error: float
+        self, file: ModelElements, root: Path, scale: float, packages: Mapping[str, Path], visual_error: float
     ) -> None:
         self.file, self.scale = file, scale
         self.notes: list[ImportNote] = [*file.unheld]
@@ -255,6 +269,7 @@ class _UrdfImport:
             body=body,
             type=_TYPES[joint.type],
             axis=tidy(self._axis(joint)),
+            anchor=tidy(np.array(joint.anchor) * self.scale),
             lower=lower,
             upper=upper,
             velocity_limit=_bound(joint.velocity),
@@ -280,7 +295,8 @@ class _UrdfImport:
         at = min(max(0.0, lower), upper)
         if joint.type == "prismatic":
             return np.array([*(self._axis(joint) * at), 0.0, 0.0, 0.0, 1.0])
-        return np.concatenate([np.zeros(3), P.from_axis_angle(self._axis(joint), np.array(at))])
+        turn, anchor = P.from_axis_angle(self._axis(joint), np.array(at)), np.array(joint.anchor) * self.scale
+        return np.concatenate([anchor - P.rotate(turn, anchor), turn])
 
     # ------------------------------------------------------------------ links
 

@@ -9,14 +9,16 @@ from collections import Counter
 from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from anysim.assets.bounded_files import xml_root
+from anysim.assets.model import ImportNote
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.math import pose as P
+from anysim.model.world import Vec3
 from anysim_urdf.unheld import notes_of
 
 Rgba = tuple[float, float, float, float]
@@ -76,14 +78,33 @@ class JointElement(NamedTuple):
     mimic: MimicElement | None
     stiffness: float = 0.0  # of a spring, and where it rests
     spring_rest: float = 0.0
+    anchor: Vec3 = (0.0, 0.0, 0.0)  # in the child's frame; a URDF has it at the origin
+
+
+class ModelElements(Protocol):
+    """The links and joints of a file, and how its parts are called in a sentence."""
+
+    path: Path
+    name: str
+    unheld: list[ImportNote]
+    instead: str
+    links: dict[str, LinkElement]
+    joints: list[JointElement]
+
+    def where(self, kind: str, name: str) -> str:
+        """A part with its place in the file."""
+        ...
 
 
 class UrdfFile:
-    """The links and joints of a URDF file, in its order."""
+    """The links and joints of a URDF file, in its order.
 
-    def __init__(self, path: Path) -> None:
+    Of a xacro file `expanded` is what xacro made of it: lines are those of that.
+    """
+
+    def __init__(self, path: Path, expanded: Path | None = None) -> None:
         self.path = path
-        root = self._tree()
+        root = self._tree(expanded or path)
         self._lines: dict[tuple[str, str], int] = {}
         self._materials: dict[str, Rgba] = {}
         self._expanded(root)
@@ -97,7 +118,7 @@ class UrdfFile:
         self.unheld = notes_of(root)
         self.instead = _instead([str(element.tag) for element in root])
         self._springs = {
-            element.get("reference"): tuple(self._text(element, tag) for tag in ("springStiffness", "springReference"))
+            element.get("reference"): (self._text(element, "springStiffness"), self._text(element, "springReference"))
             for element in root.findall("gazebo")
             if element.find("springStiffness") is not None
         }
@@ -110,8 +131,8 @@ class UrdfFile:
 
     # ------------------------------------------------------------------ the file
 
-    def _tree(self) -> Any:
-        root, _ = xml_root(self.path)
+    def _tree(self, read: Path) -> Any:
+        root, _ = xml_root(read)
         if root.tag != "robot":
             raise AssetError(f"{self.path}: a URDF has the root element <robot>, this one has <{root.tag}>")
         return root
@@ -121,7 +142,7 @@ class UrdfFile:
             for key, value in element.attrib.items():
                 if "$(" in value or "${" in value:
                     text = f'<{element.tag} {key}="{value}"> is an expression of xacro or roslaunch'
-                    raise self._error(element, f"{text} that was not expanded; run xacro on the source first")
+                    raise self._error(element, f"{text} that was not expanded; name the .xacro file itself")
 
     def _named_once(self, kind: str, elements: list[Any]) -> None:
         for element in elements:
@@ -197,6 +218,7 @@ class UrdfFile:
         if mimic is not None:
             multiplier, offset = self._number(mimic, "multiplier", 1.0), self._number(mimic, "offset", 0.0)
             follows = MimicElement(mimic.get("joint") or "", multiplier, offset)
+        stiffness, rest = self._springs.get(element.get("name"), (0.0, 0.0))
         return JointElement(
             element.get("name"),
             element.get("type") or "",
@@ -211,7 +233,8 @@ class UrdfFile:
             0.0 if dynamics is None else self._number(dynamics, "damping", 0.0),
             0.0 if dynamics is None else self._number(dynamics, "friction", 0.0),
             follows,
-            *self._springs.get(element.get("name"), (0.0, 0.0)),
+            stiffness,
+            rest,
         )
 
     def _origin(self, element: Any) -> Array:
@@ -269,5 +292,5 @@ def _instead(tags: list[str]) -> str:
     if "deformable" in tags:
         return "it is a deformable body of PyBullet, and the neutral model has rigid ones"
     if any("xacro" in tag for tag in tags):
-        return "it is a xacro source, which needs to be expanded first"
+        return "it is a xacro source: call the file NAME.xacro"
     return f"it holds {listing(dict.fromkeys(f'<{tag}>' for tag in tags), 6)}"

@@ -99,7 +99,7 @@ def test_a_floating_mjcf_with_wheels_is_a_base(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(AssetError, match="takes a URDF or MJCF file"):
+    with pytest.raises(AssetError, match="takes a model file"):
         draft(tmp_path / "none.urdf")
 
 

@@ -294,7 +294,7 @@ REFUSED = {
     "duplicate joint": (A + B + C + joint("j", "a", "b") + joint("j", "b", "c"), "two joints have the name 'j'"),
     "no mass": (A + B + joint("j", "a", "b"), "no link that moves has a mass"),
     "xacro": (link("a", MESH.format("$(optenv X a)/b.stl")), "arm.urdf:3: <mesh"),
-    "xacro brace": (link("${prefix}a"), "run xacro on the source first"),
+    "xacro brace": (link("${prefix}a"), "name the .xacro file itself"),
     "plane": (link("a", PLANE), "link 'a' has a <plane>; a URDF knows box, sphere, cylinder, capsule, mesh"),
     "no size": (link("a", "<collision><geometry><box/></geometry></collision>"), "<box> of link 'a' lacks size"),
     "partial inertia": (link("a", PART), "<inertia> of link 'a' lacks iyy"),

@@ -111,10 +111,28 @@ def _packages(given: list[str]) -> dict[str, Path]:
     return found
 
 
+def _arguments(given: list[str]) -> dict[str, str]:
+    """Values by name, of `NAME:=VALUE`."""
+    from anysim.errors import AnysimError
+
+    found: dict[str, str] = {}
+    for words in given:
+        name, marker, value = words.partition(":=")
+        if not name or not marker or name in found:
+            raise AnysimError(f"--arg {words}: expected NAME:=VALUE, each name once, such as hand:=true")
+        found[name] = value
+    return found
+
+
 @app.command("import")
 def import_(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A URDF or MJCF file; FILE.xml#BODY for one of several bodies.")
+        str,
+        typer.Argument(
+            metavar="FILE|FOLDER|NAME",
+            help="A URDF, xacro, SDF or MJCF file, FILE.xml#BODY for one of several bodies; a folder with one; or a "
+            "name of robot_descriptions, as panda_description.",
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option("--out", help="The YAML file to write; default NAME.yaml in this folder.")
@@ -128,10 +146,14 @@ def import_(
             metavar="NAME=FOLDER", help="Where the package is that a URDF calls package://NAME/…; may be given again."
         ),
     ] = None,
+    arg: Annotated[
+        list[str] | None,
+        typer.Option("--arg", metavar="NAME:=VALUE", help="An argument of a xacro file; may be given again."),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
     json: AsJson = False,
 ) -> None:
-    """Write a draft of a catalogue entry for a URDF or MJCF file, and read it back from the engines.
+    """Write a draft of a catalogue entry for a model file, and read it back from the engines.
 
     Base, channels, tools, legs and gains are guessed from names, the tree and the inertias; what could not be inferred
     stands in the draft as comments that begin with TODO, above all the licence. The draft loads and builds as it is:
@@ -141,6 +163,7 @@ def import_(
       anysim robot import my_arm.urdf
       anysim robot import robot.xml --out my_robot.yaml --name my_robot
       anysim robot import my_arm.urdf --package my_meshes=../my_meshes
+      anysim robot import my_arm.urdf.xacro --arg hand:=true
     """
     from anysim.assets.catalogue import load_robot
     from anysim.cli.output import print_json
@@ -148,7 +171,7 @@ def import_(
     from anysim_robots.cli.robot_work import audited
     from anysim_robots.drafting.draft import draft
 
-    made = draft(file, name, _packages(package or []))
+    made = draft(file, name, _packages(package or []), _arguments(arg or []))
     target = out or Path(f"{made.name}.yaml")  # never beside the model: that is somebody else's folder
     if target.exists() and not force:
         raise AnysimError(f"there is a file {target} already; give another --out, or --force to replace it")

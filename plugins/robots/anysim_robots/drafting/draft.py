@@ -1,11 +1,13 @@
 """A draft of a catalogue entry as YAML that loads and builds, with comments where a person has to decide."""
 
+import json
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from math import inf, isinf
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from anysim.assets.load import import_asset, split_body
 from anysim.assets.model import ImportedModel
@@ -13,6 +15,11 @@ from anysim.errors import AssetError
 from anysim.model.world import ControlMode, Joint
 from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SETTLING, STANDING, Gains, gains
 from anysim_robots.drafting.guess import Guess, guess, home_of, within
+from anysim_robots.drafting.sources import source_of
+from anysim_robots.drafting.srdf import Srdf, beside, read
+
+HOMES = ("home", "ready", "half_sitting", "standing", "default", "initial")
+"""Names of poses that a robot begins in, the likelier first."""
 
 NO_LICENCE = "LicenseRef-TODO"
 
@@ -20,7 +27,8 @@ NO_LICENCE = "LicenseRef-TODO"
 class Draft(NamedTuple):
     """What is known of a model. `open` is what nobody but a person can say; `notes` are the importer's.
 
-    `packages` are the folders of what the file refers to as `package://NAME/…`, absolute, by NAME.
+    `packages` are the folders of what the file refers to as `package://NAME/…`, absolute, by NAME; `arguments` those
+    of a xacro; `uri` is the name of a file that has another than its path.
     """
 
     name: str
@@ -31,6 +39,9 @@ class Draft(NamedTuple):
     open: tuple[str, ...]
     notes: tuple[str, ...]
     packages: Mapping[str, Path] = MappingProxyType({})
+    arguments: Mapping[str, Any] = MappingProxyType({})
+    uri: str = ""
+    srdf: Srdf | None = None
 
     def text(self, folder: Path) -> str:
         """The YAML, for a file in this folder."""
@@ -39,7 +50,7 @@ class Draft(NamedTuple):
     # ------------------------------------------------------------------ parts of the file
 
     def _head(self, folder: Path) -> list[str]:
-        g, source = self.guess, _source(self.file, folder, self.packages)
+        g, source = self.guess, self.uri or _source(self.file, folder, self)
         lines = [f"# Draft of {self.file.name}, made by `anysim robot import`. What begins with TODO needs a person."]
         lines += [f"# TODO {words}" for words in self.open]
         lines += [f"# Importer: {' '.join(words.split())}" for words in self.notes]
@@ -48,6 +59,10 @@ class Draft(NamedTuple):
             f"name: {self.name}",
             f"description: {len(self.model.joints)} joints, from {self.file.name}  # TODO one line for people",
             f"source: {_quoted(source)}",
+            *(
+                ["params:", *(f"  {_quoted(k)}: {json.dumps(v)}" for k, v in self.arguments.items())]
+                * bool(self.arguments)
+            ),
             *self._packages(folder),
             f"license: {NO_LICENCE}",
             "license_source: TODO",
@@ -93,8 +108,16 @@ class Draft(NamedTuple):
             lines += [
                 self._drive(joint, ControlMode.VELOCITY if velocity else ControlMode.POSITION) for joint in joints
             ]
+            lines += self._groups(joints)
             lines += self._controllers(name, joints)
         return lines
+
+    def _groups(self, joints: tuple[str, ...]) -> list[str]:
+        """Parts of a channel that the SRDF names."""
+        groups = {} if self.srdf is None else self.srdf.groups
+        inside = {name: own for name, own in groups.items() if set(own) < set(joints) and re.fullmatch(r"\w+", name)}
+        lines = [f"      {_quoted(name)}: [{', '.join(map(_quoted, own))}]" for name, own in inside.items()]
+        return ["    groups:  # of the SRDF", *lines] if lines else []
 
     def _drive(self, name: str, mode: ControlMode) -> str:
         """The line of a joint: what the file says of its drive where that is of this mode, else guesses."""
@@ -140,7 +163,13 @@ class Draft(NamedTuple):
 
     def _rest(self) -> list[str]:
         g, lines = self.guess, []
-        home = home_of(self.model)
+        home, poses = home_of(self.model), {} if self.srdf is None else self.srdf.poses
+        told = _home_pose(self.srdf)
+        if told:
+            lines.append(f"# Home is the pose '{told}' of the SRDF, within the limits.")
+        for name, pose in poses.items():
+            if name != told and pose:
+                lines.append(f"# Pose '{name}' of the SRDF: {{{', '.join(f'{j}: {v:g}' for j, v in pose.items())}}}")
         if home:
             lines += ["home:", *(f"  {_quoted(joint)}: {value!r}" for joint, value in home.items())]
         if g.tool is not None:
@@ -154,36 +183,79 @@ class Draft(NamedTuple):
                 joints = ", ".join(map(_quoted, leg.joints))
                 lines.append(f"  {leg.name}: {{joints: [{joints}], foot: {_quoted(leg.foot)}}}")
         weighed = "false" if g.floating or g.anchored else "true"
+        apart = () if self.srdf is None else self.srdf.apart
+        if apart:
+            lines.append("# Pairs of the SRDF, for `self_collision: true`")
+            lines += ["self_collision_exclusions:", *(f"  - [{_quoted(a)}, {_quoted(b)}]" for a, b in apart)]
         lines += ["self_collision: false", f"gravity_compensation: {weighed}"]
         return lines
 
 
-def draft(file: Path, name: str | None = None, packages: Mapping[str, Path] = MappingProxyType({})) -> Draft:
-    """Look at a model file.
+def draft(
+    file: Path | str,
+    name: str | None = None,
+    packages: Mapping[str, Path] = MappingProxyType({}),
+    arguments: Mapping[str, Any] = MappingProxyType({}),
+) -> Draft:
+    """Look at a model.
 
     Args:
-        file: URDF or MJCF; `FILE.xml#BODY` for one of several bodies.
+        file: a model file, `FILE.xml#BODY` for one of several bodies; a folder with one; or a name of
+            robot_descriptions.
         name: in the catalogue; that of the body or the file where not given.
         packages: folders of what a URDF refers to as `package://NAME/…`, by NAME.
+        arguments: of a xacro, by name.
 
     Raises:
         AssetError: there is no such file or folder, or it cannot be imported.
     """
-    whole, body = split_body(str(file))
-    if not Path(whole).is_file():
-        raise AssetError(f"there is no file {whole}; `anysim robot import` takes a URDF or MJCF file")
-    path = file.resolve()
-    folders = {package: folder.resolve() for package, folder in packages.items()}
-    model = import_asset(str(path), packages=_named(folders))
+    source = source_of(str(file))
+    body = split_body(str(source.file))[1]
+    path = source.file.resolve()
+    folders = {package: folder.resolve() for package, folder in {**source.packages, **packages}.items()}
+    arguments = {**source.arguments, **arguments}
+    model = import_asset(source.uri or str(path), packages=_named(folders), params=arguments)
+    beside_it = beside(path)
+    srdf = None if beside_it is None else read(beside_it, model)
+    if srdf is not None:
+        model = _at_home(model, srdf)
     found = guess(model)
     legs = frozenset(joint for leg in found.legs for joint in leg.joints)
-    chosen = re.sub(r"\W+", "_", name or body or path.stem).strip("_").lower()
+    stem = source.uri.partition(":")[2] or path.name.split(".")[0]
+    chosen = re.sub(r"\W+", "_", name or body or stem).strip("_").lower()
     if not chosen or not chosen[0].isalpha():
         chosen = f"robot_{chosen}".rstrip("_")
-    notes = tuple(str(note) for note in model.report)
+    notes = tuple(str(note) for note in (*model.report, *(() if srdf is None else srdf.notes)))
     return Draft(
-        chosen, path, model, found, gains(model, found.floating, legs), tuple(_open(model, found)), notes, folders
+        chosen,
+        path,
+        model,
+        found,
+        gains(model, found.floating, legs),
+        tuple(_open(model, found)),
+        notes,
+        folders,
+        arguments,
+        source.uri,
+        srdf,
     )
+
+
+def _home_pose(srdf: Srdf | None) -> str:
+    """The name of the pose that a robot begins in; empty where the SRDF has none of `HOMES`."""
+    return "" if srdf is None else next((name for name in HOMES if srdf.poses.get(name)), "")
+
+
+def _at_home(model: ImportedModel, srdf: Srdf) -> ImportedModel:
+    """The model with its joints where the SRDF has them at first, within their limits."""
+    pose = srdf.poses.get(_home_pose(srdf), {})
+    joints = tuple(
+        replace(joint, initial=min(max(pose[joint.name], joint.lower), joint.upper))
+        if joint.name in pose and joint.mimic is None
+        else joint
+        for joint in model.joints
+    )
+    return replace(model, joints=joints)
 
 
 def _open(model: ImportedModel, found: Guess) -> list[str]:
@@ -233,13 +305,13 @@ def _named(packages: Mapping[str, Path]) -> dict[str, str]:
     return {name: str(folder) for name, folder in packages.items()}
 
 
-def _source(file: Path, folder: Path, packages: Mapping[str, Path]) -> str:
+def _source(file: Path, folder: Path, made: Draft) -> str:
     """The file as the entry names it: relative where all that it refers to is below, else absolute."""
     folder = folder.resolve()
     if file.is_relative_to(folder):
         relative = str(file.relative_to(folder))
         try:
-            import_asset(relative, base=folder, packages=_named(packages))
+            import_asset(relative, base=folder, packages=_named(made.packages), params=made.arguments)
         except AssetError:
             return str(file)
         return relative

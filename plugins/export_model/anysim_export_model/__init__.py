@@ -1,0 +1,1 @@
+"""Worlds, robots and objects of anysim, written as URDF and MJCF files."""

@@ -1,0 +1,178 @@
+"""SDF files: frames that are relative to each other, includes, nested models, and what is said of the rest."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anysim.assets.load import import_asset
+from anysim.assets.model import Fate, ImportedModel
+from anysim.compile.world import compile_world
+from anysim.errors import AssetError
+from anysim.math import pose as P
+from anysim.model.world import BodyKind, Capsule, Cylinder
+from anysim_schemas.run import WorldSpec
+from anysim_urdf.sdf_coverage import ROWS
+
+INERTIAL = "<inertial><mass>2</mass><inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.2</izz></inertia></inertial>"
+
+
+def sdf(body: str, version: str = "1.9") -> str:
+    return f'<sdf version="{version}">{body}</sdf>'
+
+
+ARM = f"""<model name="arm"><frame name="mount"><pose>0 0 0.5 0 0 0</pose></frame>
+<link name="base">{INERTIAL}</link>
+<link name="upper"><pose relative_to="shoulder">0.1 0 0 0 0 0</pose>{INERTIAL}<gravity>false</gravity>
+  <collision name="c"><pose relative_to="mount">0 0 0 0 0 0</pose><geometry><capsule><radius>0.1</radius>
+  <length>0.4</length></capsule></geometry></collision>
+  <visual name="v"><geometry><cylinder><radius>0.2</radius><length>0.6</length></cylinder></geometry><material>
+  <diffuse>1 0 0 1</diffuse></material><transparency>0.5</transparency></visual></link>
+<link name="lower"><pose relative_to="upper" degrees="true">0 0 1 0 90 0</pose>{INERTIAL}</link>
+<joint name="shoulder" type="revolute"><pose relative_to="mount">0 0.2 0 0 0 0</pose>
+  <parent>base</parent><child>upper</child>
+  <axis><xyz>0 0 1</xyz><limit><lower>-1</lower><upper>2</upper><effort>5</effort><velocity>-1</velocity></limit>
+  <dynamics><damping>0.3</damping><friction>0.1</friction>
+  <spring_stiffness>4</spring_stiffness><spring_reference>0.2</spring_reference>
+  </dynamics></axis></joint>
+<joint name="elbow" type="prismatic"><parent>upper</parent><child>lower</child><axis>
+  <xyz expressed_in="mount">0 0 1</xyz>
+  <mimic joint="shoulder"><multiplier>2</multiplier><reference>0.5</reference></mimic>
+  </axis></joint><plugin name="p" filename="x.so"/></model>"""
+
+
+def written(folder: Path, text: str, name: str = "arm.sdf") -> str:
+    (folder / name).write_text(text)
+    return str(folder / name)
+
+
+def frame(model: ImportedModel, name: str) -> np.ndarray:
+    """The pose (7,) of a body at zero in the root's frame."""
+    number = next(i for i, body in enumerate(model.bodies) if body.name == name)
+    pose = P.pose((0, 0, 0), (0, 0, 0, 1))
+    while number > 0:
+        pose = P.compose(P.pose(model.bodies[number].position, model.bodies[number].quaternion), pose)
+        number = model.bodies[number].parent
+    return pose
+
+
+def test_frames_joints_and_shapes(tmp_path: Path) -> None:
+    model = import_asset(written(tmp_path, sdf(ARM)))
+    assert model.bodies[0].kind is BodyKind.FREE
+    shoulder, elbow = model.joints
+    assert frame(model, "upper")[:3] == pytest.approx([0.1, 0.2, 0.5])
+    assert shoulder.anchor == pytest.approx((-0.1, 0.0, 0.0))
+    assert (shoulder.lower, shoulder.upper, shoulder.effort_limit, shoulder.velocity_limit) == (-1.0, 2.0, 5.0, np.inf)
+    assert (shoulder.damping, shoulder.friction, shoulder.stiffness, shoulder.spring_rest) == (0.3, 0.1, 4.0, 0.2)
+    assert frame(model, "lower")[:3] == pytest.approx([0.1, 0.2, 1.5])
+    assert elbow.axis == pytest.approx((-1.0, 0.0, 0.0))  # up, seen from a link that is turned about y
+    assert elbow.mimic == (0, 2.0, -1.0)
+    collision, visual = (next(g for g in model.geoms if g.collides is on) for on in (True, False))
+    assert collision.shape == Capsule(0.1, 0.2)
+    assert collision.position == pytest.approx((-0.1, -0.2, 0.0))
+    assert visual.shape == Cylinder(0.2, 0.3)
+    assert visual.color == (1.0, 0.0, 0.0, 0.5)
+    assert [body.gravity_compensation for body in model.bodies] == [False, True, False]
+    assert any("<plugin>" in note.where for note in model.report)
+    free = compile_world(WorldSpec.model_validate({"objects": {"it": {"source": "arm.sdf"}}}), base=tmp_path)
+    assert free.bodies[1].inertial.mass == 2.0
+
+
+def test_a_world_of_includes_and_nested_models(tmp_path: Path) -> None:
+    (tmp_path / "table").mkdir()
+    written(tmp_path / "table", sdf(f'<model name="t"><link name="top">{INERTIAL}</link></model>'), "model.sdf")
+    text = f"""<world name="kitchen"><include><uri>model://table</uri><name>desk</name><pose>1 2 3 0 0 0</pose>
+      <static>true</static></include>
+      <model name="pair"><model name="left" placement_frame="top"><pose>1 0 0 0 0 0</pose>
+        <link name="leg">{INERTIAL}</link>
+        <link name="top"><pose>0 0 1 0 0 0</pose>{INERTIAL}</link>
+        <joint name="glue" type="fixed"><parent>leg</parent><child>top</child></joint></model>
+      <include><uri>table/model.sdf</uri><name>right</name></include>
+      <joint name="tie" type="fixed"><parent>right::top</parent><child>left::top</child></joint>
+      <joint name="ground" type="revolute"><parent>world</parent>
+      <child>right</child><axis><xyz>0 0 1</xyz></axis></joint>
+      </model></world>"""
+    path = written(tmp_path, sdf(text), "kitchen.world")
+    desk = import_asset(f"{path}#desk")
+    assert desk.bodies[0].kind is BodyKind.STATIC
+    with pytest.raises(AssetError, match=r"holds 2 models, desk, pair; name the one.*kitchen\.world#desk"):
+        import_asset(path)
+    with pytest.raises(AssetError, match="no model 'dsk'; did you mean 'desk'"):
+        import_asset(f"{path}#dsk")
+    with pytest.raises(AssetError, match="has 2 links that no joint carries, left::leg, world"):
+        import_asset(f"{path}#pair")
+    path = written(tmp_path, sdf(text.replace("left::top</child>", "left::leg</child>")), "kitchen.world")
+    pair = import_asset(f"{path}#pair")
+    assert [body.name for body in pair.bodies] == ["world", "right::top"]
+    assert pair.bodies[0].kind is BodyKind.STATIC
+    leg = next(site for site in pair.sites if site.name == "left::leg")
+    assert leg.position == pytest.approx((1.0, 0.0, -1.0))  # its top is at (1, 0, 0)
+    two = written(
+        tmp_path, sdf(f'<model name="m"><link name="a">{INERTIAL}</link><link name="b">{INERTIAL}</link></model>')
+    )
+    with pytest.raises(AssetError, match=r"has 2 links that no joint carries, a, b; name the one.*arm\.sdf#m::a"):
+        import_asset(two)
+    assert import_asset(f"{two}#m::b").bodies[0].name == "b"
+
+
+REFUSED = {
+    "ball": (ARM.replace('"revolute"', '"ball"'), "is of type 'ball'"),
+    "number": (ARM.replace("<mass>2", "<mass>two"), r"arm.sdf:2: <mass> is 'two'; expected 1 finite numbers"),
+    "frame": (ARM.replace('relative_to="mount"', 'relative_to="mont"'), "no frame 'mont'; did you mean 'mount'"),
+    "cycle": (ARM.replace('name="mount">', 'name="mount" attached_to="upper">'), "is relative to itself"),
+    "link": (ARM.replace("<child>lower", "<child>lowr"), "refers to the link 'lowr', which does not exist"),
+    "twice": (ARM.replace('"lower"', '"upper"'), "two parts have the name 'upper'"),
+    "auto": (ARM.replace("<inertial>", '<inertial auto="true">'), "masses are not computed of shapes"),
+    "include out": ("<include><uri>../../../etc/passwd</uri></include>", "leaves its folder"),
+    "include scheme": ("<include><uri>https://fuel.example/arm</uri></include>", "expected model://NAME"),
+    "include none": ("<include><uri>model://nothing</uri></include>", "which does not exist"),
+    "include self": ("<include><uri>arm.sdf</uri></include>", "levels of inclusion"),
+    "mesh out": (
+        ARM.replace(
+            "<cylinder><radius>0.2</radius><length>0.6</length></cylinder>", "<mesh><uri>/etc/passwd</uri></mesh>"
+        ),
+        "leaves the asset's root",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_said_is_refused_in_a_sentence(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    (tmp_path / "etc").mkdir()
+    (tmp_path / "etc" / "passwd").write_text("x")
+    text, message = REFUSED[name]
+    text = text.replace("../../../etc", "../../etc")
+    with pytest.raises(AssetError, match=message):
+        import_asset(written(folder, sdf(text)))
+
+
+def test_entities_and_links_are_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    with pytest.raises(AssetError, match="document type declaration"):
+        import_asset(written(folder, f"<!DOCTYPE r [<!ENTITY a 'b'>]>{sdf(ARM)}"))
+    written(tmp_path, sdf(ARM), "secret.sdf")
+    (folder / "arm.sdf").unlink()
+    (folder / "link.sdf").symlink_to(tmp_path / "secret.sdf")
+    with pytest.raises(AssetError, match="which leaves its folder"):
+        import_asset(written(folder, sdf("<include><uri>link.sdf</uri></include>")))
+
+
+def test_each_element_that_is_left_out_is_in_the_report(tmp_path: Path) -> None:
+    from lxml import etree
+
+    from anysim_urdf.sdf_coverage import notes_of
+
+    for row in ROWS:
+        if row.fate is not Fate.LEFT_OUT:
+            continue
+        root = etree.Element("model", name="m")
+        node = root
+        for tag in row.path.split("/")[1:]:
+            node = etree.SubElement(node, tag)
+        if row.attributes:
+            node.set(row.attributes.split()[0], "x")
+        told = "\n".join(map(str, notes_of(root)))
+        assert row.text in told, row
