@@ -36,6 +36,7 @@ WORDS = {
     "control": "tools by inverse kinematics and operational space, vehicles, hands",
     "evaluation": "`anysim evaluate`, `anysim benchmark`: how often policies solve tasks, and whether engines agree",
     "export": "`anysim export`: recorded runs as data sets of LeRobot, robomimic, RLDS and webdataset; `anysim tape`",
+    "fields": "magnets, fire, smoke and wind beside any engine",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
     "inspect": "`anysim list`, `check`, `doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, drawn, kept",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",
