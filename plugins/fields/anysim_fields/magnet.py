@@ -6,13 +6,12 @@ import numpy as np
 
 from anysim.assets.model import ImportedModel
 from anysim.conventions import WORLD, Array
-from anysim.errors import PluginError, listing
 from anysim.families.base import FamilyPart, FamilySetting, FamilyState
 from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
 from anysim.model.world import Body, BodyKind
-from anysim.randomization.draw import draw_rows
-from anysim_fields.spec import DipoleSpec, MagnetSpec
+from anysim_fields.bodies import body_of, drawn, must_collide
+from anysim_fields.spec import MagnetSpec
 from anysim_schemas.base import Spec
 
 DRAWN = {"position": 3, "moment": 3, "strength": 0, "radius": 0, "permeability": 0}
@@ -39,7 +38,10 @@ class Magnet(CoSolver):
         assert isinstance(setting.spec, MagnetSpec)
         self.magnets, self.names = setting.spec, [*setting.spec.dipoles]
         world = setting.engine.world
-        self._body = np.array([_body_of(setting, *item) for item in setting.spec.dipoles.items()], dtype=np.intp)
+        self._body = np.array(
+            [body_of(setting, one.body, f"dipoles.{name}.body") for name, one in setting.spec.dipoles.items()],
+            dtype=np.intp,
+        )
         super().__init__(setting)
         slots = np.full(len(world.bodies) + 1, len(self.met), dtype=np.intp)
         slots[self.met] = np.arange(len(self.met))
@@ -47,15 +49,8 @@ class Magnet(CoSolver):
         entity = np.array(world.body_entity, dtype=np.intp)
         self._carrier = np.where(self._fixed, setting.entities[0], entity[self._body])
         for place, name in enumerate(self.names):
-            body = int(self._body[place])
-            if body != WORLD and slots[body] == len(self.met) and world.bodies[body].kind is not BodyKind.STATIC:
-                solid = listing(
-                    [world.bodies[i].name for i in sorted({g.body for g in world.geoms if g.collides}) if i >= 0]
-                )
-                raise PluginError(
-                    f"world.families.{setting.name}.dipoles.{name}.body: '{world.bodies[body].name}' has no shape that "
-                    f"collides, and a dipole acts on those that have (there are: {solid})"
-                )
+            if (body := int(self._body[place])) != WORLD and world.bodies[body].kind is not BodyKind.STATIC:
+                must_collide(setting, body, self.met, f"dipoles.{name}.body")
         d = len(self.names)
         self._values = {key: self.remember(key, d, *([size] if size else [])) for key, size in DRAWN.items()}
         self.strength, self._uniform = self._values["strength"], self.remember("uniform", 3)
@@ -69,14 +64,10 @@ class Magnet(CoSolver):
     def fill(self, env_ids: Array) -> None:
         for place, (name, one) in enumerate(self.magnets.dipoles.items()):
             for key, kept in self._values.items():
-                kept[env_ids, place] = self._drawn(getattr(one, key), f"dipoles.{name}.{key}", env_ids)
-        self._uniform[env_ids] = self._drawn(self.magnets.field, "field", env_ids)
+                kept[env_ids, place] = drawn(self.setting, getattr(one, key), f"dipoles.{name}.{key}", env_ids)
+        self._uniform[env_ids] = drawn(self.setting, self.magnets.field, "field", env_ids)
         bodies, there = self.engine.get_state().body_pose[env_ids], self.engine.presence[env_ids]
         self._work_out(env_ids, bodies, there)
-
-    def _drawn(self, value: object, key: str, env_ids: Array) -> Array:
-        path, stream = f"world.families.{self.setting.name}.{key}", f"family/{self.setting.name}/{key}"
-        return draw_rows(value, stream, self.setting.streams, env_ids, source=path)
 
     def _frames(self, env_ids: Array, body_pose: Array) -> tuple[Array, Array]:
         """Where the dipoles are (n, D, 3) [m], and how their bodies are turned (n, D, 4)."""
@@ -169,19 +160,3 @@ class Magnet(CoSolver):
     def recorded(self, env_ids: Array) -> Mapping[str, Array]:
         acts = {key: self._acts[key][env_ids] for key in ("force", "torque")}
         return {**acts, "moment": self._acts["magnetised"][env_ids]}
-
-
-def _body_of(setting: FamilySetting, name: str, one: DipoleSpec) -> int:
-    """The body of a dipole, or WORLD."""
-    if one.body is None:
-        return WORLD
-    world = setting.engine.world
-    if one.body in world.entity_numbers:
-        return world.entities[world.entity_numbers[one.body]].root
-    names = [body.name for body in world.bodies]
-    if one.body not in names:
-        raise PluginError(
-            f"world.families.{setting.name}.dipoles.{name}.body: there is no body or object '{one.body}' "
-            f"({listing(names)})"
-        )
-    return names.index(one.body)

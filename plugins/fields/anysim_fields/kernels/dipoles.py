@@ -6,12 +6,9 @@ does. Since U depends on nothing but the two moments and r, momentum, angular mo
 """
 
 import math
-from functools import partial
 
 from anysim.conventions import Array
-from anysim.math.compiled import compiled as in_numba
-
-compiled = partial(in_numba, nogil=True, error_model="numpy")
+from anysim_fields.kernels.compiling import compiled
 
 MU0 = 1.25663706127e-6
 """[T m/A] CODATA 2022."""
