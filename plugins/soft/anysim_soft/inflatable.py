@@ -39,7 +39,7 @@ class Inflatable(Soft):
     spec = InflatableSpec
     label = "balloon"
     tint = (0.85, 0.25, 0.3)
-    drawn_keys = (*Soft.drawn_keys, "young", "poisson", "damping", "thickness", "pressure")
+    drawn_keys = ("density", "drag", "friction", "young", "poisson", "damping", "thickness", "pressure")
 
     def __init__(self, setting: FamilySetting) -> None:
         if not mujoco.__version__.startswith(f"{CHECKED}."):

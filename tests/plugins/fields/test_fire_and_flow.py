@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.testing.engines import require_drawing, require_engine
@@ -18,6 +17,7 @@ from anysim_fields.fire import Fire
 from anysim_fields.flow import Flow
 from anysim_fields.kernels.air import air_velocity, climb_time, jet_speed, plume_speed, plume_warmth
 from anysim_fields.kernels.haze import haze
+from anysim_recording.collector import Collector
 from tests.contract.suite_runs import run
 from tests.plugins.fields.worlds import ALL, ENGINES, balls, begun, run_of, wait
 from tests.schemas.test_every_key import Still

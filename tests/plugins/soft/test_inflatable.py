@@ -4,6 +4,7 @@ import json
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,10 +58,10 @@ def test_its_pressure_rises_while_it_is_squeezed_as_the_law_of_gases_has_it(engi
     world = {"objects": {"board": board}, "layout": {"board": {"position": [0.0, 0.0, 0.225]}}}
     with begun(run_of({**BALLOON, "damping": 0.05}, engine, world)) as (env, it):
         assert isinstance(it, Inflatable)
-        before, high = it.volume(0), it.facts(0)["it"]["high"]
+        before, high = it.volume(0), it.x[0, :, 2].max()
         wait(env, 90)
-        facts = it.facts(0)["it"]
-        assert facts["high"][2] < high[2] - 0.01
+        facts: Any = it.facts(0)["it"]
+        assert facts["high"][2] < high - 0.01
         assert facts["volume"] < before
         assert facts["pressure"] > 520.0
         assert (AIR + facts["pressure"]) * facts["volume"] == pytest.approx(it.gas[0], rel=3e-5)
@@ -117,9 +118,8 @@ def test_parameters_are_drawn_by_env():
             assert len(set(it.values[:, column])) == 3, key
         assert len(set(it.gas)) == 3
         wait(env)
-        assert it.facts(2)["it"]["mass"] == pytest.approx(
-            it.values[2, 0] * it.parameter("thickness", 2) * 4 * np.pi * 0.01
-        )
+        skin = it.parameter("density", 2) * it.parameter("thickness", 2) * 4 * np.pi * 0.01
+        assert it.facts(2)["it"]["mass"] == pytest.approx(skin)
 
 
 @pytest.mark.parametrize(
