@@ -1,4 +1,4 @@
-"""What each of the fifteen families does on each engine: the suite, snapshots, partial resets, replays, looks, cost.
+"""The fifteen families on each engine: the suite, snapshots, partial resets, replays, looks, cost.
 
     python benchmarks/families.py [--engine mujoco,pybullet,sapien] [--families fire,magnet] [--write]
 
