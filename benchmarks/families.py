@@ -46,7 +46,7 @@ MATTER: dict[str, tuple[str, dict[str, Any]]] = {
     "sand": ("about 200 grains", {"box": [0.06, 0.06, 0.06]}),
     "rice": ("about 200 balls", {"box": [0.03, 0.03, 0.02]}),
     "inflatable": ("42 points", {"radius": 0.1, "subdivisions": 1}),
-    "rope": ("41 points", {"path": [[-0.25, 0.0, 0.0], [0.25, 0.0, 0.0]], "position": [0.0, 0.0, 0.02]}),
+    "rope": ("41 points", {"path": [[-0.25, 0.0, 0.0], [0.25, 0.0, 0.0]], "position": [0.0, 0.0, 0.3]}),
     "magnet": ("2 dipoles", {"dipoles": {"one": {"body": "ball", "moment": [0, 0, 2]}, "two": {"moment": [0, 0, 9]}}}),
     "fire": ("400 puffs", {}),
     "flow": ("250 puffs", {"speed": 1.0, "emission": 1e-3, "wind": [0.2, 0, 0], "drag": {"ball": {"area": 0.03}}}),
