@@ -37,6 +37,7 @@ WORDS = {
     "evaluation": "`anysim evaluate`, `anysim benchmark`: how often policies solve tasks, and whether engines agree",
     "export": "`anysim export`: recorded runs as data sets of LeRobot, robomimic, RLDS and webdataset; `anysim tape`",
     "export-model": "`anysim export-model`: robots and worlds as URDF and MJCF files",
+    "fields": "magnets, fire, smoke and wind beside any engine",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
     "household": "a pack of nearly a hundred household objects and tools: vessels, packages, food, tools, appliances",
     "inspect": "`anysim list`, `check`, `doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, drawn, kept",

@@ -123,3 +123,25 @@ class FemClothSpec(SoftSpec):
     attached: dict[Edge, Reference] = Field(
         default_factory=dict, description="edges or corners that a body holds where they are at the reset"
     )
+
+
+class InflatableSpec(SoftSpec):
+    """A thin elastic ball with gas in it."""
+
+    radius: Positive = Field(default=0.15, description="of the ball where nothing stretches it [m]")
+    pressure: NonNegativeValue = Field(
+        default=1000.0, description="of the gas above that of the air, when an episode begins [Pa]"
+    )
+    thickness: PositiveValue = Field(default=0.001, description="of the skin [m]")
+    young: PositiveValue = Field(default=1e6, description="Young's modulus of the skin [Pa]; rubber has 1e6")
+    poisson: Value[Annotated[float, Field(ge=0.0, le=0.5)]] = Field(default=0.45, description="Poisson's ratio")
+    damping: NonNegativeValue = Field(
+        default=0.01,
+        description="[s] Rayleigh's: what moves it apart is resisted by the stiffness times this times the rate",
+    )
+    density: DensityValue = Field(default=1000.0, description="of the skin [kg/m^3]")
+    subdivisions: Annotated[Integer, Field(ge=1, le=3)] = Field(
+        default=2, description="of the 20 triangles of an icosahedron: 42, 162 or 642 points"
+    )
+    skin: Positive = Field(default=0.003, description="[m] from its surface at which contacts act")
+    substeps: Integer = Field(default=2, gt=0, le=50, description="of the solver in a physics step")

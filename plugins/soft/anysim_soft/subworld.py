@@ -173,6 +173,18 @@ class SubWorld:
         """(V, 3) [m] the nodes."""
         return self.data.xpos[self.nodes].copy()
 
+    def node_speeds(self) -> Array:
+        """(V, 3) [m/s] of nodes that all move."""
+        return self.data.qvel[self._dofs].copy()
+
+    def stretch(self, factor: float) -> None:
+        """Put nodes that all move to `factor` times their distance from their middle, from the beginning."""
+        places = self.node_places()
+        rows = self.model.jnt_qposadr[self.model.body_jntadr[self._moving]][:, None] + np.arange(3)
+        local = P.rotate_inverse(self.data.xquat[self._moving][:, [1, 2, 3, 0]], places - places.mean(axis=0))
+        self.data.qpos[rows] = (factor - 1.0) * local
+        self.place()
+
     def momentum(self) -> Array:
         """(6,) of the flex, about the world's origin."""
         p = self.mass[:, None] * self.data.qvel[self._dofs]
@@ -193,15 +205,18 @@ class SubWorld:
         data.mocap_pos[self._mocap[~there[k:]], 2] = AWAY
         self.model.geom_friction[self._geoms, 0] = friction[self.scenery.geoms]
 
-    def step(self, substeps: int, drag: float) -> Outcome:
-        """Move on by `substeps` steps, from a state that was loaded."""
+    def step(self, substeps: int, drag: float, inside: Callable[["SubWorld"], Array] | None = None) -> Outcome:
+        """Move on by `substeps` steps, from a state that was loaded.
+
+        `inside` gives forces (V, 3) [N] between nodes that all move, which sum up to nothing.
+        """
         model, data, h = self.model, self.data, self.model.opt.timestep
         impulse, received = np.zeros((len(self._pose), 6)), np.zeros(6)
         slower = (1.0 - np.exp(-drag * h)) / h
         for _ in range(substeps):
             before = self.momentum()
             at, air = data.xpos[self._moving].copy(), -slower * self.mass[:, None] * data.qvel[self._dofs]
-            data.qfrc_applied[self._dofs] = air
+            data.qfrc_applied[self._dofs] = air if inside is None else air + inside(self)
             turn = P.to_matrix(data.qpos[self._pose[:, 3:]][:, [1, 2, 3, 0]])
             arm = np.einsum("kij,kj->ki", turn, self._com)
             centre = data.qpos[self._pose[:, :3]] + arm

@@ -1,0 +1,1 @@
+"""Magnets, fire, smoke and wind beside any engine."""
