@@ -1,0 +1,47 @@
+"""Resistance of cloth to bending: a quadratic energy of surfaces that bend and do not stretch.
+
+Between triangles of a sheet that is flat at rest the energy D/2 times the square of the curvature, integrated over the
+sheet, is half of D x^T Q x with a matrix Q that does not change, as long as lengths do not. Its rows sum to zero, so it
+gives no momentum.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+
+
+def bending_matrix(points: Array, hinges: Array) -> Array:
+    """(V, V) [1/m^2] Q, from places (V, 2) at rest and hinges (H, 4), an edge and the points opposite to it."""
+    a, b, c, d = (points[hinges[:, i]] for i in range(4))
+
+    def cotangent(one: Array, two: Array) -> Array:
+        return P.dot(one, two) / np.maximum(np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]), 1e-15)
+
+    def area(at: Array) -> Array:
+        one, two = b - a, at - a
+        return np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+
+    at_a, at_b = (cotangent(b - a, c - a), cotangent(b - a, d - a)), (cotangent(a - b, c - b), cotangent(a - b, d - b))
+    row = np.stack([at_b[0] + at_b[1], at_a[0] + at_a[1], -at_a[0] - at_b[0], -at_a[1] - at_b[1]], axis=1)
+    local = 3.0 / (area(c) + area(d))[:, None, None] * row[:, :, None] * row[:, None, :]
+    found = np.zeros((len(points), len(points)))
+    np.add.at(found, (hinges[:, :, None], hinges[:, None, :]), local)
+    return found
+
+
+def bending_force(
+    matrix: Array, rigidity: float, damping: float, mass: Array, h: float
+) -> Callable[[Array, Array], Array] | None:
+    """Forces (V, 3) [N] on points from places and velocities (V, 3), those of the end of a step of `h` [s].
+
+    Where a step begins they would be too large for stiff cloth; a mass of inf [kg] is of a point that does not move.
+    """
+    if rigidity <= 0.0:
+        return None
+    ahead = h + damping
+    resisted = np.eye(len(mass)) + h * ahead * rigidity * matrix / mass[None, :]
+    acts = np.linalg.solve(resisted, -rigidity * matrix)
+    return lambda places, velocities: acts @ (places + ahead * velocities)
