@@ -21,6 +21,8 @@ HEAVY = 1e4
 """[kg], [kg m^2] of a body that joints hold."""
 STIFF = (0.999, 0.99999, 0.001, 0.5, 2.0)
 """Impedance of what holds a rope together, or matter at a body."""
+GRIP = (0.95, 0.99, 0.001, 0.5, 2.0)
+"""The same of what holds cloth for a while."""
 AWAY = -1e4
 """[m] height of the proxy of a body that is not there."""
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -153,7 +155,7 @@ class SubWorld:
         self._mocap = model.body_mocapid[[model.body(f"still {i}").id for i in range(s)]]
         self._geoms = np.array([model.geom(f"{i}").id for i in range(len(scenery.geoms))], dtype=np.intp)
         self._com = bodies.com
-        connects = np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_CONNECT)
+        connects = np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_CONNECT))
         self._slots = connects[len(connects) - len(slots.places) :]
         self.faces = _faces(model)
 
@@ -226,7 +228,7 @@ class SubWorld:
     def pulls(self) -> Array:
         """(S, 3) [N] on the body of each slot in the last substep, world axes."""
         data, found = self.data, np.zeros((len(self._slots), 3))
-        rows = np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        rows = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY))
         place = np.full(self.model.neq, -1)
         place[self._slots] = np.arange(len(self._slots))
         rows = rows[place[data.efc_id[rows]] >= 0]
@@ -274,7 +276,7 @@ class SubWorld:
         sums up to more than one, and 15 to 20 % of the momentum would come from nowhere. Here it is scaled to one.
         """
         model, data = self.model, self.data
-        rows = np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)
+        rows = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC))
         if not len(rows):
             return
         if mujoco.mj_isSparse(model):
@@ -363,7 +365,7 @@ def _compiled(
     for place, node, active in held:
         element = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY, active=active)
         element.name1, element.name2 = f"met {place}", names[node]
-        element.solref, element.solimp = [2 * dt, 1.0], STIFF
+        element.solref, element.solimp = [2 * dt, 1.0], STIFF if active else GRIP
     made = spec.compile()
     for row, joint in zip(np.flatnonzero(made.eq_type == mujoco.mjtEq.mjEQ_CONNECT), joints, strict=False):
         made.eq_data[row, :3], made.eq_data[row, 3:6] = joint.anchor, 0.0
