@@ -52,7 +52,7 @@ class GarmentSpec(SoftSpec):
     shirt: ShirtSpec | None = Field(default=None, description="the cut of a T-shirt")
     spacing: Positive = Field(default=0.025, description="of its points at most [m]")
     areal_density: PositiveValue = Field(default=0.3, description="mass by area of the cloth [kg/m^2]")
-    bending: NonNegativeValue = Field(default=1e-4, description="flexural rigidity of a strip by its width [N m]")
+    bending: NonNegativeValue = Field(default=3e-5, description="flexural rigidity of a strip by its width [N m]")
     damping: NonNegativeValue = Field(
         default=0.02, description="[s] Rayleigh's of bending: the rigidity times this times the rate resists"
     )
