@@ -24,8 +24,8 @@ Spots = Annotated[tuple[Spot, ...], Field(description="points of the garment tha
 class ClothCarry(PhasedSkill):
     """Carry the point `at` of `cloth`, which `robot` holds, to where it is to lie.
 
-    That is `goal`, or over the point `onto` of the same cloth, or where it would be if the cloth lay flat with the points
-    `by` where they are. The way is an arc, a half circle where `arc` is 1.
+    That is `goal`, or over the point `onto` of the same cloth, or where it would be if the cloth lay flat with the
+    points `by` where they are. The way is an arc, a half circle where `arc` is 1.
     """
 
     def __init__(

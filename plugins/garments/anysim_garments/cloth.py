@@ -59,7 +59,7 @@ class Cloth:
         """(n,) bool: a pad holds it at a point within so much [m] of places (n, 3)."""
         state = self.state()
         near = P.norm(state.points - places[:, None]) < within
-        return (near & state.fields["held"]).any(axis=1)
+        return np.logical_or.reduce(near & state.fields["held"], axis=1)
 
     def laid_out(self, number: int, by: Array, points: Array) -> Array:
         """(n, 3) where a point would be if it lay flat with points `by` (b,) where they are; of points (n, V, 3)."""

@@ -159,7 +159,7 @@ class LetGo:
         self._cloth = Cloth(scene, category)
 
     def __call__(self) -> Array:
-        return ~self._cloth.state().fields["held"].any(axis=1)
+        return ~np.logical_or.reduce(self._cloth.state().fields["held"], axis=1)
 
 
 class Below:

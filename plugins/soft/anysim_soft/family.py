@@ -20,7 +20,7 @@ from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
 from anysim_schemas.base import Spec
 from anysim_soft.spec import MOST, SoftSpec
-from anysim_soft.subworld import FlexSource, Joint, ProxyMass, Scenery, Slots, SubWorld
+from anysim_soft.subworld import NOTHING, FlexSource, Joint, ProxyMass, Scenery, Slots, SubWorld
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -59,7 +59,7 @@ class Soft(CoSolver):
 
     def slots(self) -> Slots:
         """What bodies may take hold of it while an episode lasts, and which ones do not touch it."""
-        return Slots()
+        return NOTHING
 
     def before_solve(self, env: int, sub: SubWorld) -> None:
         """The world of an env has its state, and its solver is about to move on."""

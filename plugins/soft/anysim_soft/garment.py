@@ -83,9 +83,9 @@ class Garment(Soft):
             if (found > most).any():
                 row = int(np.argmax(found - most))
                 raise PluginError(
-                    f"world.families.{self.setting.name}.bending: cloth of {found[row]:.3g} N m is too stiff for steps of "
-                    f"{self._step:g} s with points {self.garment.spacing:g} m apart, {most[row]:.3g} N m at most; give more "
-                    f"`substeps`, or a larger `spacing`"
+                    f"world.families.{self.setting.name}.bending: cloth of {found[row]:.3g} N m is too stiff for steps "
+                    f"of {self._step:g} s with points {self.garment.spacing:g} m apart, {most[row]:.3g} N m at most; "
+                    f"give more `substeps`, or a larger `spacing`"
                 )
         return found
 

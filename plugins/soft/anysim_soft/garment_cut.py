@@ -1,6 +1,7 @@
 """Cuts of garments as triangles in the plane: a towel, and a T-shirt of one piece or of two that are sewn together."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -74,17 +75,14 @@ def _shirt(spec: ShirtSpec, spacing: float) -> Cut:
 
 def _lines(stops: Sequence[float], spacing: float) -> Array:
     """Through all stops, and evenly between them, `spacing` apart at most."""
-    parts = [
-        np.linspace(a, b, max(1, int(np.ceil((b - a) / spacing - 1e-6))) + 1)[:-1]
-        for a, b in zip(stops, stops[1:], strict=False)
-    ]
+    parts = [np.linspace(a, b, max(1, int(np.ceil((b - a) / spacing - 1e-6))) + 1)[:-1] for a, b in pairwise(stops)]
     return np.append(np.concatenate(parts), stops[-1])
 
 
-def _grid(x: Array, y: Array, there: object = None) -> tuple[Array, Array]:
+def _grid(x: Array, y: Array, there: Callable[[Array], Array] | None = None) -> tuple[Array, Array]:
     """Points and triangles of those rectangles of a grid whose middle is `there`; diagonals alternate."""
     i, j = (a.ravel() for a in np.meshgrid(np.arange(len(x) - 1), np.arange(len(y) - 1), indexing="ij"))
-    if callable(there):
+    if there is not None:
         kept = there(np.stack([(x[i] + x[i + 1]) / 2, (y[j] + y[j + 1]) / 2], axis=1))
         i, j = i[kept], j[kept]
     a, b, c, d = (k * len(y) + m for k, m in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)))

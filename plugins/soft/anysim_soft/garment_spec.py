@@ -60,7 +60,9 @@ class GarmentSpec(SoftSpec):
         default=0.0, description="share of its extent along x that lies folded over the rest when an episode begins"
     )
     radius: Positive = Field(default=0.003, description="[m] from its middle at which contacts act")
-    fixed: tuple[Edge, ...] = Field(default=(), description="sides or corners of its outline that stay where they begin")
+    fixed: tuple[Edge, ...] = Field(
+        default=(), description="sides or corners of its outline that stay where they begin"
+    )
     attached: dict[Edge, Reference] = Field(
         default_factory=dict, description="sides or corners that a body holds where they are at the reset"
     )

@@ -72,6 +72,10 @@ class Slots(NamedTuple):
     silent: frozenset[int] = frozenset()
 
 
+NOTHING = Slots()
+"""Nothing takes hold of it."""
+
+
 class ProxyMass(NamedTuple):
     """Bodies that it meets: (K,) [kg], inf where joints hold them, (K, 3) [m] and (K, 6) [kg m^2], body axes."""
 
@@ -133,7 +137,7 @@ class SubWorld:
         joints: Sequence[Joint],
         dt: float,
         gravity: Array,
-        slots: Slots = Slots(),
+        slots: Slots = NOTHING,
     ) -> None:
         self.scenery, self.gravity, self.source = scenery, np.array(gravity, dtype=float), source
         self.model = model = _compiled(source, scenery, bodies, joints, slots, dt, gravity)

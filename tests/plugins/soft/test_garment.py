@@ -1,5 +1,7 @@
 """Garments: their cut, how they bend, and hands that hold them."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -28,6 +30,12 @@ def held(engine="mujoco", **pad):
 def go(env, action, steps):
     for _ in range(steps):
         env.step(np.repeat(action, env.num_envs, axis=0))
+
+
+def hand_of(env, number=0):
+    """What is said of the pad in an env."""
+    facts: Any = env.families.facts(number)["it"]["pads"]
+    return facts["hand"]
 
 
 def test_cuts_have_the_areas_and_openings_that_they_are_asked_for():
@@ -90,7 +98,7 @@ def test_a_hand_that_closes_holds_cloth_feels_its_weight_and_is_remembered(engin
     require_engine(engine)
     with begun(held(engine), num_envs=2) as (env, it):
         go(env, CLOSE, 40)
-        one = env.families.facts(1)["it"]["pads"]["hand"]
+        one = hand_of(env, 1)
         assert one["stage"] == "holding"
         assert len(one["points"]) >= 1
         tool = env.scene.frame("panda.tool").position
@@ -111,9 +119,7 @@ def test_a_hand_that_closes_holds_cloth_feels_its_weight_and_is_remembered(engin
         env.reset_to(snapshot)
         go(env, CLOSE, 3)
         assert np.array_equal(it.x, expected)
-        assert env.families.state("it").fields["held"].sum() == sum(
-            len(env.families.facts(i)["it"]["pads"]["hand"]["points"]) for i in (0, 1)
-        )
+        assert env.families.state("it").fields["held"].sum() == sum(len(hand_of(env, i)["points"]) for i in (0, 1))
         before = it.x[..., 2].max()
         go(env, OPEN, 15)
         assert not env.families.state("it").fields["held"].any()
@@ -123,10 +129,10 @@ def test_a_hand_that_closes_holds_cloth_feels_its_weight_and_is_remembered(engin
 def test_cloth_comes_off_where_it_pulls_too_hard_until_the_hand_has_opened():
     with begun(held(force=0.01)) as (env, it):
         go(env, CLOSE, 30)
-        assert env.families.facts(0)["it"]["pads"]["hand"]["stage"] == "empty"
+        assert hand_of(env, 0)["stage"] == "empty"
         assert it.body_force(ALL)[..., :3].max() < 1e-9
         go(env, OPEN, 15)
-        assert env.families.facts(0)["it"]["pads"]["hand"]["stage"] == "open"
+        assert hand_of(env, 0)["stage"] == "open"
 
 
 def test_it_begins_folded_as_it_is_asked_to():
@@ -166,7 +172,10 @@ SHEET = {"kind": "garment", "towel": [0.1, 0.1]}
 def test_what_cannot_be_is_refused(change, words):
     stand = {"objects": {"stand": {"source": {"box": [0.1, 0.1, 0.1]}, "fixed": True}}, "robots": {"panda": PANDA}}
     world = {**stand, "layout": {"stand": {"position": [0.5, 0.5, 0.05]}}} if "pads" in change else None
-    with pytest.raises(anysim.errors.AnysimError, match=words), anysim.make(run_of({**SHEET, **change}, world=world)) as e:
+    with (
+        pytest.raises(anysim.errors.AnysimError, match=words),
+        anysim.make(run_of({**SHEET, **change}, world=world)) as e,
+    ):
         e.reset(seed=0)
 
 
@@ -176,5 +185,5 @@ def test_stages_are_apart():
         stages = []
         for action in (CLOSE, OPEN, CLOSE):
             go(env, action, 12)
-            stages.append(env.families.facts(0)["it"]["pads"]["hand"]["stage"])
+            stages.append(hand_of(env, 0)["stage"])
         assert stages == ["empty", "open", "empty"]
