@@ -9,7 +9,13 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim_avatars.hold import FREE, HELD
-from tests.tasks import bench_paths as bench, camera_paths as camera, matter_paths as matter, person_paths as person
+from tests.tasks import (
+    bench_paths as bench,
+    camera_paths as camera,
+    garment_paths as garment,
+    matter_paths as matter,
+    person_paths as person,
+)
 from tests.tasks.states import failed, level, offset, put, rewarded, seen, set_joint, set_opening
 
 
@@ -452,6 +458,9 @@ CASES: dict[str, Case] = {
     ),
     "flip_switch": Case(_opening("switch.rocker", 0.0, 0.95), [lambda env: set_opening(env, "switch.rocker", 0.85)]),
     "pour_beads": Case(_POURED, [matter.spill_beads]),
+    "hang_towel": Case(garment.let_go(garment.between(garment.over_rail)), [garment.shift(y=0.1), garment.take_hold]),
+    "spread_towel": Case(garment.let_go(garment.between(garment.spread)), [garment.crumple(0.8), garment.take_hold]),
+    "fold_towel": Case(garment.let_go(garment.between(garment.folded)), [garment.turn_up, garment.take_hold]),
     "pour_water": Case(_POURED, [lambda env: matter.spill(env, "water", 0.3)]),
     "plug_charger": _plugged(0.036),
     "usb_insert": _plugged(0.034),

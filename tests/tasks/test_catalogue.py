@@ -20,14 +20,15 @@ NEAR = 1e-5
 """[m, rad] engines keep poses in single precision."""
 ENGINES = ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.param("sapien", marks=pytest.mark.slow)]
 VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "unplug_charger", "go1_velocity_rough"}
-"""Those that differ from another task in sizes alone, or share its world or its way."""
+VARIANTS |= {"spread_towel", "fold_towel"}
+"""Those that differ from another task in sizes alone, or share its world, its matter or its way."""
 SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
 SOFT = ("go1_velocity", "go1_velocity_rough", "g1_velocity", "get_up")
 """Tasks whose drives hold no weight at once, or whose robot begins above the ground."""
 SHIPPED = {"stand_still": 8, "go1_velocity": 8, "go1_velocity_rough": 4}
 """Those that come with a trained policy, and how many of eight episodes it has to solve."""
-MATTER = ("pour_water",)
+MATTER = ("pour_water", "hang_towel", "spread_towel", "fold_towel")
 """Tasks whose matter pushes at things, which the engine without physics refuses: the model of these is MuJoCo."""
 DEEPEST, REPLAYED = 2e-3, 25
 """How far things may be inside of one another at a reset [m], and steps that are replayed."""

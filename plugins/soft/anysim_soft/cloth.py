@@ -32,7 +32,7 @@ class FemCloth(Soft):
     spec = FemClothSpec
     label = "cloth"
     tint = (0.35, 0.5, 0.75)
-    drawn_keys = (*Soft.drawn_keys, "young", "poisson", "damping", "thickness", "bending")
+    drawn_keys = (*Soft.drawn_keys, "density", "young", "poisson", "damping", "thickness", "bending")
 
     def __init__(self, setting: FamilySetting) -> None:
         if not mujoco.__version__.startswith(f"{CHECKED}."):

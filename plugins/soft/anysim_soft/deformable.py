@@ -25,7 +25,7 @@ class Deformable(Soft):
     spec = DeformableSpec
     label = "soft block"
     tint = (0.85, 0.45, 0.35)
-    drawn_keys = (*Soft.drawn_keys, "young", "poisson", "damping")
+    drawn_keys = (*Soft.drawn_keys, "density", "young", "poisson", "damping")
 
     @classmethod
     def count(cls, spec: SoftSpec) -> int:

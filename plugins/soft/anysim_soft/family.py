@@ -20,7 +20,7 @@ from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
 from anysim_schemas.base import Spec
 from anysim_soft.spec import MOST, SoftSpec
-from anysim_soft.subworld import FlexSource, Joint, ProxyMass, Scenery, SubWorld
+from anysim_soft.subworld import NOTHING, FlexSource, Joint, ProxyMass, Scenery, Slots, SubWorld
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -40,7 +40,7 @@ class Soft(CoSolver):
     drawn = True
     label: ClassVar[str]
     tint: ClassVar[tuple[float, float, float]]
-    drawn_keys: ClassVar[tuple[str, ...]] = ("density", "drag", "friction")
+    drawn_keys: ClassVar[tuple[str, ...]] = ("drag", "friction")
 
     # ------------------------------------------------------------------ what kinds differ in
 
@@ -60,6 +60,16 @@ class Soft(CoSolver):
     def inside(self, env: int) -> Callable[[SubWorld], Array] | None:
         """What gives forces of the matter on itself that the solver does not know, once a step of it."""
         return None
+
+    def slots(self) -> Slots:
+        """What bodies may take hold of it while an episode lasts, and which ones do not touch it."""
+        return NOTHING
+
+    def before_solve(self, env: int, sub: SubWorld) -> None:
+        """The world of an env has its state, and its solver is about to move on."""
+
+    def after_solve(self, env: int, sub: SubWorld) -> None:
+        """The solver of an env has moved on."""
 
     @property
     @abstractmethod
@@ -107,7 +117,8 @@ class Soft(CoSolver):
             self._nodes = np.concatenate([self._nodes, nodes])
             self._holders = np.append(self._holders, [self._met(name, "attached", loose=False)] * len(nodes))
         self.anchors = self.remember("anchors", len(self._nodes), 3)
-        example = SubWorld(source, self.scenery, built, self._joints(self.anchors[0]), self._step, self._gravity)
+        joints = self._joints(self.anchors[0])
+        example = SubWorld(source, self.scenery, built, joints, self._step, self._gravity, self.slots())
         size = len(example.points())
         self.x, self.v = self.remember("x", size, 3), self.remember("v", size, 3)
         self.moved, self.state_row = self.remember("moved", 6), self.remember("state", example.state_size)
@@ -181,7 +192,7 @@ class Soft(CoSolver):
             values = dict(zip(self.drawn_keys, self.values[env].tolist(), strict=True))
             source = self.source(values, self.frame[env])
             joints = self._joints(self.anchors[env])
-            made = (key, SubWorld(source, self.scenery, bodies, joints, self._step, self._gravity))
+            made = (key, SubWorld(source, self.scenery, bodies, joints, self._step, self._gravity, self.slots()))
             self._worlds[env] = made
         return made[1]
 
@@ -200,7 +211,9 @@ class Soft(CoSolver):
             sub.load(self.state_row[env])
             sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
             sub.place()
+            self.before_solve(env, sub)
             done = sub.step(self.soft.substeps, self.parameter("drag", env), self.inside(env))
+            self.after_solve(env, sub)
             self.received[env] += done.received
             self.state_row[env], self.moved[env] = sub.state(), sub.momentum()
             points = sub.points()

@@ -23,6 +23,7 @@ class Rope(Soft):
     spec = RopeSpec
     label = "rope"
     tint = (0.8, 0.65, 0.4)
+    drawn_keys = (*Soft.drawn_keys, "density")
 
     @classmethod
     def count(cls, spec: SoftSpec) -> int:
@@ -92,6 +93,6 @@ class Rope(Soft):
             draw_spheres(points, self.radius, self.color(), mark, view, row, images)
 
 
-def edges(dt: float) -> str:
+def edges(dt: float, impedance: str = "") -> str:
     """Edges of fixed length, as stiff as a step of `dt` [s] allows."""
-    return f'<edge equality="true" solref="{2 * dt!r} 1" solimp="{numbers(np.array(STIFF[:3]))}"/>'
+    return f'<edge equality="true" solref="{2 * dt!r} 1" solimp="{impedance or numbers(np.array(STIFF[:3]))}"/>'

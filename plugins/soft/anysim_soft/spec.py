@@ -29,7 +29,6 @@ class SoftSpec(Spec):
         default=None,
         description="a body, or an object: `position` is then in its frame, turned by its heading alone, at the reset",
     )
-    density: DensityValue = Field(default=1000.0, description="of the matter [kg/m^3]")
     drag: NonNegativeValue = Field(
         default=0.0, description="rate at which it loses velocity to air at rest [1/s]: exp(-drag t)"
     )
@@ -47,6 +46,7 @@ class DeformableSpec(SoftSpec):
     """A block of an elastic solid, which is stress-free as the box."""
 
     box: tuple[Positive, Positive, Positive] = Field(description="edges [m]; its frame is at the middle of its bottom")
+    density: DensityValue = Field(default=1000.0, description="of the matter [kg/m^3]")
     young: PositiveValue = Field(default=1e5, description="Young's modulus [Pa]")
     poisson: Value[Annotated[float, Field(ge=0.0, le=0.45)]] = Field(default=0.3, description="Poisson's ratio")
     damping: NonNegativeValue = Field(
@@ -83,6 +83,7 @@ class RopeSpec(SoftSpec):
     path: Annotated[tuple[Vec3, ...], Field(min_length=2)] = Field(
         description="corners [m] of the line along which it lies when an episode begins, in its frame: it is as long"
     )
+    density: DensityValue = Field(default=1000.0, description="of the matter [kg/m^3]")
     radius: Positive = Field(default=0.005, description="[m]")
     segments: Annotated[Integer, Field(ge=2, le=400)] = Field(default=40, description="of equal length, straight each")
     fixed: tuple[Literal["start", "end"], ...] = Field(default=(), description="ends that stay where they begin")

@@ -21,6 +21,8 @@ HEAVY = 1e4
 """[kg], [kg m^2] of a body that joints hold."""
 STIFF = (0.999, 0.99999, 0.001, 0.5, 2.0)
 """Impedance of what holds a rope together, or matter at a body."""
+GRIP = (0.95, 0.99, 0.001, 0.5, 2.0)
+"""The same of what holds cloth for a while."""
 AWAY = -1e4
 """[m] height of the proxy of a body that is not there."""
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -36,6 +38,8 @@ class FlexSource(NamedTuple):
         options: attributes of `option`.
         sides: (V,) bool by name, the nodes there that bodies hold.
         adjust: changes the model once it is made.
+        start: (V, 3) [m] where points begin, if they are not stress-free there.
+        inner: forces (V, 3) [N] of its points on each other, from their places and velocities (V, 3).
     """
 
     xml: str
@@ -44,6 +48,8 @@ class FlexSource(NamedTuple):
     options: Mapping[str, object]
     sides: Mapping[str, Array] = MappingProxyType({})
     adjust: Callable[[Any], None] | None = None
+    start: Array | None = None
+    inner: Callable[[Array, Array], Array] | None = None
 
 
 class Joint(NamedTuple):
@@ -52,6 +58,22 @@ class Joint(NamedTuple):
     node: int
     place: int
     anchor: Array
+
+
+class Slots(NamedTuple):
+    """What bodies may take hold of while an episode lasts.
+
+    Attributes:
+        places: for each connection that can be made the place in `met` of its body.
+        silent: places in `met` of bodies that do not touch the flex.
+    """
+
+    places: Sequence[int] = ()
+    silent: frozenset[int] = frozenset()
+
+
+NOTHING = Slots()
+"""Nothing takes hold of it."""
 
 
 class ProxyMass(NamedTuple):
@@ -115,9 +137,10 @@ class SubWorld:
         joints: Sequence[Joint],
         dt: float,
         gravity: Array,
+        slots: Slots = NOTHING,
     ) -> None:
         self.scenery, self.gravity, self.source = scenery, np.array(gravity, dtype=float), source
-        self.model = model = _compiled(source, scenery, bodies, joints, dt, gravity)
+        self.model = model = _compiled(source, scenery, bodies, joints, slots, dt, gravity)
         self.data = mujoco.MjData(model)
         self.held = ~np.isfinite(bodies.mass)
         nodes = model.flex_nodebodyid if model.flex_interp[0] else model.flex_vertbodyid
@@ -136,6 +159,8 @@ class SubWorld:
         self._mocap = model.body_mocapid[[model.body(f"still {i}").id for i in range(s)]]
         self._geoms = np.array([model.geom(f"{i}").id for i in range(len(scenery.geoms))], dtype=np.intp)
         self._com = bodies.com
+        connects = np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_CONNECT))
+        self._slots = connects[len(connects) - len(slots.places) :]
         self.faces = _faces(model)
 
     @property
@@ -146,6 +171,11 @@ class SubWorld:
     def beginning(self) -> Array:
         """The state in which nothing has moved yet."""
         mujoco.mj_resetData(self.model, self.data)
+        if self.source.start is not None:
+            moving = self.model.body_dofnum[self.nodes] > 0
+            first = self.model.jnt_qposadr[self.model.body_jntadr[self._moving]]
+            flat = self.model.body_pos[self._moving]
+            self.data.qpos[first[:, None] + np.arange(3)] = self.source.start[moving] - flat
         return self.state()
 
     def state(self) -> Array:
@@ -205,6 +235,22 @@ class SubWorld:
         data.mocap_pos[self._mocap[~there[k:]], 2] = AWAY
         self.model.geom_friction[self._geoms, 0] = friction[self.scenery.geoms]
 
+    def hold(self, nodes: Array, anchors: Array, holding: Array) -> None:
+        """Which nodes (S,) are held at the slots, where in their bodies' frames (S, 3) [m], and whether (S,) bool."""
+        self.model.eq_obj2id[self._slots] = self.nodes[nodes]
+        self.model.eq_data[self._slots, :3], self.model.eq_data[self._slots, 3:6] = anchors, 0.0
+        self.data.eq_active[self._slots] = holding
+
+    def pulls(self) -> Array:
+        """(S, 3) [N] on the body of each slot in the last substep, world axes."""
+        data, found = self.data, np.zeros((len(self._slots), 3))
+        rows = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY))
+        place = np.full(self.model.neq, -1)
+        place[self._slots] = np.arange(len(self._slots))
+        rows = rows[place[data.efc_id[rows]] >= 0]
+        found[place[data.efc_id[rows[::3]]]] = data.efc_force[rows].reshape(-1, 3)
+        return found
+
     def step(self, substeps: int, drag: float, inside: Callable[["SubWorld"], Array] | None = None) -> Outcome:
         """Move on by `substeps` steps, from a state that was loaded.
 
@@ -217,6 +263,8 @@ class SubWorld:
             before = self.momentum()
             at, air = data.xpos[self._moving].copy(), -slower * self.mass[:, None] * data.qvel[self._dofs]
             data.qfrc_applied[self._dofs] = air if inside is None else air + inside(self)
+            if self.source.inner is not None:
+                data.qfrc_applied[self._dofs] += self._inner()
             turn = P.to_matrix(data.qpos[self._pose[:, 3:]][:, [1, 2, 3, 0]])
             arm = np.einsum("kij,kj->ki", turn, self._com)
             centre = data.qpos[self._pose[:, :3]] + arm
@@ -233,6 +281,13 @@ class SubWorld:
         data.qfrc_applied[:] = 0.0
         return Outcome(impulse, received)
 
+    def _inner(self) -> Array:
+        """(M, 3) [N] of the points on each other, those that move."""
+        assert self.source.inner is not None
+        velocity, moving = np.zeros((len(self.nodes), 3)), self.model.body_dofnum[self.nodes] > 0
+        velocity[moving] = self.data.qvel[self._dofs]
+        return self.source.inner(self.data.xpos[self.nodes], velocity)[moving]
+
     def _even_contacts(self) -> None:
         """Make the rows of contacts push the flex as much as what it touches.
 
@@ -240,7 +295,7 @@ class SubWorld:
         sums up to more than one, and 15 to 20 % of the momentum would come from nowhere. Here it is scaled to one.
         """
         model, data = self.model, self.data
-        rows = np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)
+        rows = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC))
         if not len(rows):
             return
         if mujoco.mj_isSparse(model):
@@ -284,7 +339,13 @@ def _faces(model: Any) -> Array:
 
 
 def _compiled(
-    source: FlexSource, scenery: Scenery, bodies: ProxyMass, joints: Sequence[Joint], dt: float, gravity: Array
+    source: FlexSource,
+    scenery: Scenery,
+    bodies: ProxyMass,
+    joints: Sequence[Joint],
+    slots: Slots,
+    dt: float,
+    gravity: Array,
 ) -> Any:
     options = " ".join(f'{key}="{value}"' for key, value in source.options.items())
     pull = " ".join(repr(float(g)) for g in gravity)
@@ -303,6 +364,7 @@ def _compiled(
             for joint in list(element.joints):
                 spec.delete(joint)
     add_assets(spec, scenery.world)
+    silent = slots.silent | {joint.place for joint in joints}
     _add_shapes(spec, spec.worldbody, scenery.number.get(WORLD, ()), scenery)
     for place, body in enumerate(scenery.still.tolist()):
         element = spec.worldbody.add_body(name=f"still {place}", mocap=True)
@@ -316,14 +378,15 @@ def _compiled(
         element.mass = HEAVY if held else bodies.mass[place]
         moments = np.array([HEAVY] * 3 + [0.0] * 3) if held else bodies.inertia[place]
         element.fullinertia = moments
-        _add_shapes(spec, element, scenery.number[body], scenery, touches=place not in {j.place for j in joints})
+        _add_shapes(spec, element, scenery.number[body], scenery, touches=place not in silent)
     names = [model.body(body).name for body in nodes]
-    for joint in joints:
-        element = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY)
-        element.name1, element.name2 = f"met {joint.place}", names[joint.node]
-        element.solref, element.solimp = [2 * dt, 1.0], STIFF
+    held = [(joint.place, joint.node, True) for joint in joints] + [(place, 0, False) for place in slots.places]
+    for place, node, active in held:
+        element = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY, active=active)
+        element.name1, element.name2 = f"met {place}", names[node]
+        element.solref, element.solimp = [2 * dt, 1.0], STIFF if active else GRIP
     made = spec.compile()
-    for row, joint in zip(np.flatnonzero(made.eq_type == mujoco.mjtEq.mjEQ_CONNECT), joints, strict=True):
+    for row, joint in zip(np.flatnonzero(made.eq_type == mujoco.mjtEq.mjEQ_CONNECT), joints, strict=False):
         made.eq_data[row, :3], made.eq_data[row, 3:6] = joint.anchor, 0.0
     if source.adjust is not None:
         source.adjust(made)

@@ -1,0 +1,1 @@
+"""Skills with cloth, and terms that measure how it lies."""

@@ -1,0 +1,158 @@
+"""The family `garment`: cloth that is cut to a form, whose edges keep their length, and that hands hold.
+
+A hand that is declared as a pad takes hold of the points nearest to it at the moment when it closes, and lets go of
+them when it opens, or where they pull harder than it holds.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import PluginError, SpecError, SpecIssue
+from anysim.families.base import FamilySetting, FamilyState
+from anysim.families.cosolver import MetBodies
+from anysim.math import pose as P
+from anysim_soft.bending import bending_force, bending_matrix, fastest
+from anysim_soft.deformable import contact_of, numbers, on_side
+from anysim_soft.family import Soft
+from anysim_soft.garment_cut import Cut, cut_of
+from anysim_soft.garment_spec import GarmentSpec
+from anysim_soft.pads import Pads
+from anysim_soft.rope import edges
+from anysim_soft.spec import SoftSpec
+from anysim_soft.subworld import FlexSource, Slots, SubWorld
+
+MOST_POINTS = 1600
+"""Of a garment: its bending takes a matrix of so many rows."""
+OPTIONS = {"integrator": "implicitfast", "solver": "CG", "iterations": 100, "tolerance": 1e-8, "cone": "elliptic"}
+"""With this integrator points and bodies get what constraints gave, however far the solver came."""
+STABLE = 2.0
+"""Of the square of a step times the rate of the fastest bending wave, below which cloth does not come apart: 4."""
+EDGE = "0.95 0.99 0.001"
+"""Impedance of edges: stiffer ones take a solver that is some times slower."""
+
+
+class Garment(Soft):
+    """A towel or a shirt, with the mass of its area and the rigidity of its cloth.
+
+    Attributes:
+        cut: its form.
+        pads: the hands that hold it.
+    """
+
+    spec = GarmentSpec
+    label = "garment"
+    tint = (0.8, 0.45, 0.35)
+    drawn_keys: ClassVar[tuple[str, ...]] = (*Soft.drawn_keys, "areal_density", "bending", "damping", "folded")
+
+    def __init__(self, setting: FamilySetting) -> None:
+        assert isinstance(setting.spec, GarmentSpec)
+        self.cut: Cut = cut_of(setting.spec)
+        self._matrix = bending_matrix(self.cut.points, self.cut.hinges)
+        self._rate = fastest(self._matrix, self.cut.shares())
+        self.pads = Pads(setting, setting.spec.pads)
+        super().__init__(setting)
+        self.pads.remember(self, len(self.cut.points))
+
+    @classmethod
+    def count(cls, spec: SoftSpec) -> int:
+        assert isinstance(spec, GarmentSpec)
+        count = len(cut_of(spec).points)
+        if count > MOST_POINTS:
+            words = f"it has {count:,} points; {MOST_POINTS:,} at most are possible"
+            raise SpecError([SpecIssue("", ".spacing", words)])
+        return count
+
+    @property
+    def garment(self) -> GarmentSpec:
+        """Its parameters."""
+        assert isinstance(self.soft, GarmentSpec)
+        return self.soft
+
+    @property
+    def radius(self) -> float:
+        return self.garment.radius
+
+    def drawn_value(self, key: str, env_ids: Array) -> Array:
+        found = super().drawn_value(key, env_ids)
+        if key == "bending":  # the mass is drawn before
+            density = self.values[env_ids, self.drawn_keys.index("areal_density")]
+            most = STABLE * density / (self._rate * self._step**2)
+            if (found > most).any():
+                row = int(np.argmax(found - most))
+                raise PluginError(
+                    f"world.families.{self.setting.name}.bending: cloth of {found[row]:.3g} N m is too stiff for steps "
+                    f"of {self._step:g} s with points {self.garment.spacing:g} m apart, {most[row]:.3g} N m at most; "
+                    f"give more `substeps`, or a larger `spacing`"
+                )
+        return found
+
+    # ------------------------------------------------------------------ the solver
+
+    def source(self, values: Mapping[str, float], pose: Array) -> FlexSource:
+        spec, cut = self.garment, self.cut
+        flat = np.column_stack([cut.points, cut.side * spec.radius])
+        size = np.append(cut.size, 0.0)
+        fixed = np.zeros(len(flat), dtype=bool)
+        for side in spec.fixed:
+            fixed |= on_side(cut.points, size, side)
+        mass = values["areal_density"] * cut.shares()
+        points = pose[:3] + P.rotate(pose[3:], flat)
+        xml = (
+            f'<flexcomp name="it" type="direct" dim="2" point="{numbers(points.ravel())}" '
+            f'element="{" ".join(map(str, cut.faces.ravel()))}" radius="{spec.radius!r}" mass="{float(mass.sum())!r}">'
+            f"{edges(self._step, EDGE)}{contact_of(values['friction'], self._step)}</flexcomp>"
+        )
+        start = pose[:3] + P.rotate(pose[3:], self._folded(flat, values["folded"])) if values["folded"] > 0 else None
+        felt = np.where(fixed, np.inf, mass)
+        inner = bending_force(self._matrix, values["bending"], values["damping"], felt, self._step)
+        sides = {side: on_side(cut.points, size, side) for side in spec.attached}
+        return FlexSource(xml, fixed, mass, OPTIONS, sides, start=start, inner=inner)
+
+    def _folded(self, flat: Array, share: float) -> Array:
+        """(V, 3) [m] in its frame, with a share of it folded back about a line along y."""
+        width = self.cut.size[0]
+        beyond = np.maximum(flat[:, 0] - (width / 2 - share * width), 0.0)
+        bend = self.garment.spacing
+        turn = np.minimum(beyond / bend, np.pi)
+        places = flat.copy()
+        places[:, 0] += bend * np.sin(turn) - beyond - np.maximum(beyond - np.pi * bend, 0.0)
+        places[:, 2] = bend * (1.0 - np.cos(turn)) + np.cos(turn) * flat[:, 2]
+        return places
+
+    def attached_sides(self) -> list[tuple[str, str]]:
+        return [*self.garment.attached.items()]
+
+    def slots(self) -> Slots:
+        return self.pads.slots(self.met)
+
+    def solve(self, env_ids: Array, bodies: MetBodies, duration: float) -> Array:
+        self.pads.look(env_ids, self.x[env_ids], bodies.body_pose, self.engine.get_state().joint_pos[env_ids])
+        return super().solve(env_ids, bodies, duration)
+
+    def before_solve(self, env: int, sub: SubWorld) -> None:
+        sub.hold(*self.pads.held(env))
+
+    def after_solve(self, env: int, sub: SubWorld) -> None:
+        self.pads.felt(env, sub.pulls())
+
+    # ------------------------------------------------------------------ what it looks like and means
+
+    def mass(self, env: int) -> float:
+        return self.parameter("areal_density", env) * float(self.cut.areas().sum())
+
+    def state(self, env_ids: Array) -> FamilyState:
+        """Fields: `flat` (n, V, 2) [m] where each point is in the garment's own plane, `held` (n, V) by a pad."""
+        state = super().state(env_ids)
+        flat = np.broadcast_to(self.cut.points, (len(env_ids), *self.cut.points.shape))
+        return state._replace(fields={"flat": flat.copy(), "held": self.pads.points(env_ids, len(self.cut.points))})
+
+    def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
+        more: dict[str, object] = {"area": float(self.cut.areas().sum()), "pads": self.pads.facts(env)}
+        return {name: {**known, **more} for name, known in super().facts(env).items()}
+
+    def recorded(self, env_ids: Array) -> Mapping[str, Array]:
+        more = {"pads": self.pads.stage[env_ids].copy()} if len(self.pads) else {}
+        return {**super().recorded(env_ids), **more}

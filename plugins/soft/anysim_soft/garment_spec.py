@@ -1,0 +1,75 @@
+"""Parameters of garments: their cut, their cloth, and the pads that hold them. What is drawn is drawn each episode."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from anysim_schemas.base import Integer, Name, NonNegative, Positive, Reference, Spec
+from anysim_schemas.errors import KeyFault
+from anysim_schemas.values import NonNegativeValue, PositiveValue, Value
+from anysim_soft.spec import Edge, SoftSpec
+
+Share = Annotated[float, Field(ge=0.0, le=0.8)]
+
+
+class ShirtSpec(Spec):
+    """The cut of a T-shirt: y from its hem to its neck, x to its left sleeve, lengths in [m]."""
+
+    chest: Positive = Field(default=0.4, description="width of its body [m]")
+    length: Positive = Field(default=0.5, description="from hem to shoulder [m]")
+    sleeve: Positive = Field(default=0.15, description="how far a sleeve sticks out of the body, along x [m]")
+    cuff: Positive = Field(default=0.16, description="width of a sleeve [m]")
+    slope: NonNegative = Field(default=0.3, description="how much a sleeve comes down by its length along x")
+    neck: tuple[Positive, Positive] = Field(default=(0.16, 0.05), description="width and depth of the neck's cut [m]")
+    panels: Literal[1, 2] = Field(
+        default=2, description="of cloth: front and back, sewn along sides, sleeves and shoulders; or one flat piece"
+    )
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.neck[0] >= self.chest:
+            raise KeyFault(f"the neck is not narrower than the chest, which is {self.chest:g} m wide", "neck")
+        if max(self.cuff, self.neck[1]) >= self.length:
+            raise KeyFault(f"it is not shorter than the shirt, which is {self.length:g} m long", "cuff")
+        return self
+
+
+class PadSpec(Spec):
+    """A hand that cloth sticks to while it is closed; its links do not touch the garment otherwise."""
+
+    tool: Reference = Field(description="the frame at which it sticks, such as `panda.tool`")
+    joint: Reference = Field(description="the joint that closes the hand, such as `panda.panda_finger_joint1`")
+    closed: float = Field(default=0.01, description="position of that joint [m, rad] at or below which it is closed")
+    reach: Positive = Field(default=0.02, description="how far from the frame cloth sticks when the hand closes [m]")
+    points: Annotated[Integer, Field(ge=1, le=32)] = Field(default=5, description="that stick at most, the nearest")
+    force: Positive = Field(default=20.0, description="[N] beyond which the cloth comes off, until the hand has opened")
+
+
+class GarmentSpec(SoftSpec):
+    """Cloth that is cut to a form, stretches by next to nothing, and resists bending."""
+
+    towel: tuple[Positive, Positive] | None = Field(default=None, description="edges of a towel [m], along x and y")
+    shirt: ShirtSpec | None = Field(default=None, description="the cut of a T-shirt")
+    spacing: Positive = Field(default=0.025, description="of its points at most [m]")
+    areal_density: PositiveValue = Field(default=0.3, description="mass by area of the cloth [kg/m^2]")
+    bending: NonNegativeValue = Field(default=3e-5, description="flexural rigidity of a strip by its width [N m]")
+    damping: NonNegativeValue = Field(
+        default=0.02, description="[s] Rayleigh's of bending: the rigidity times this times the rate resists"
+    )
+    folded: Value[Share] = Field(
+        default=0.0, description="share of its extent along x that lies folded over the rest when an episode begins"
+    )
+    radius: Positive = Field(default=0.003, description="[m] from its middle at which contacts act")
+    fixed: tuple[Edge, ...] = Field(
+        default=(), description="sides or corners of its outline that stay where they begin"
+    )
+    attached: dict[Edge, Reference] = Field(
+        default_factory=dict, description="sides or corners that a body holds where they are at the reset"
+    )
+    pads: dict[Name, PadSpec] = Field(default_factory=dict, description="hands that hold it while they are closed")
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        if (self.towel is None) == (self.shirt is None):
+            raise KeyFault("give one of `towel: [WIDTH, LENGTH]` and `shirt: {}`", "towel")
+        return self

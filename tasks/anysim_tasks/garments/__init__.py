@@ -1,0 +1,1 @@
+"""Tasks with cloth: towels that are hung up, spread and folded."""

@@ -1,0 +1,1 @@
+"""Hang a towel over a rail."""
