@@ -192,6 +192,7 @@ class Crew:
             where += f", which has no folder {self._begin[2]}"
         if kind == DONE:
             self._idle.append(member)
+            self._hand_out()  # before what came of this one is looked at: the worker goes on meanwhile
             yield what
         elif kind == REFUSED:
             raise RecordError(f"{what} ({where})")
