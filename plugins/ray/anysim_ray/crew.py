@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from anysim.errors import RecordError, TaskError, listing
 from anysim_ray import node
 from anysim_ray.cluster import room
-from anysim_ray.node import BROKE, DONE, LACKING, REFUSED, Place, Worker
+from anysim_ray.node import BROKE, DONE, LACKING, REFUSED, Place, Worker, packages
 
 WAIT_S = 1.0
 """How long is waited for what workers do before the nodes are counted again [s]."""
@@ -68,7 +68,7 @@ class Crew:
         self._dumps: Callable[[Any], bytes] = ray.cloudpickle.dumps
         self._remote = ray.remote(num_cpus=needs.cpus, num_gpus=needs.gpus, max_restarts=0)(Worker)
         self._begin = (self._dumps(open_), math.ceil(needs.cpus), str(Path.cwd()), tuple(sys.path))
-        self._packages = node.packages()
+        self._packages = packages()
         self._lost_by = (
             ray.exceptions.RayActorError,
             ray.exceptions.WorkerCrashedError,

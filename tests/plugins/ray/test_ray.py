@@ -166,7 +166,7 @@ def test_what_goes_wrong_is_told(cluster: Any, tmp_path: Path, monkeypatch: pyte
     with pytest.raises(RecordError, match="the module 'only_here' is missing on the node"):
         list(job_executor("ray").treat_all([(1,)], only_here.opened))
     there = node.packages()
-    monkeypatch.setattr(node, "packages", lambda: there | {"anysim": "0.0.9"})
+    monkeypatch.setattr(crew, "packages", lambda: there | {"anysim": "0.0.9"})
     with pytest.raises(TaskError, match=r"other versions: anysim .* \(here 0.0.9\); install the same on every node"):
         list(job_executor("ray").treat_all([(1,)], waiting))
 
