@@ -11,8 +11,8 @@ import numpy as np
 from PIL import Image
 
 import anysim
-from anysim.record.collector import Collector
 from anysim.skills.runner import SkillPolicy
+from anysim_recording.collector import Collector
 
 ROOT = Path(__file__).parents[1]
 OUT = ROOT / "docs" / "images" / "flights.jpg"

@@ -3,11 +3,12 @@
     python scripts/task_gallery.py [--check]
     python scripts/task_gallery.py --measure [TASK …]
 
-`--measure` draws the picture of each task that has none, and evaluates the expert and a random policy where the task is
-new or has changed, one policy on one engine at a time, short tasks first. It takes minutes for each, and goes on where
-it was cut off: finished ones are in docs/tasks.json, the episodes of the one at hand in runs/gallery. Figures of the
-tasks of `core12` are those of docs/benchmark.json where these have as many episodes. `--check` writes nothing and exits
-with 1 if the page has drifted, or if an expert solves less than the difficulty of its task promises.
+`--measure` draws the picture of each task that has none. Where a task is new or has changed it evaluates its expert, or
+the learned policy that comes with it where it has none, and a random policy: one on one engine at a time, short tasks
+first. It takes minutes for each, and goes on where it was cut off: finished ones are in docs/tasks.json, the episodes
+of the one at hand in runs/gallery. Figures of the tasks of `core12` are those of docs/benchmark.json where these have
+as many episodes. `--check` writes nothing and exits with 1 if the page has drifted, or if an expert or such a policy
+solves less than the difficulty of its task promises.
 """
 
 import json
@@ -28,11 +29,12 @@ from anysim.api import load, task_path
 from anysim.math.statistics import wilson
 from anysim.record.commit import write_whole
 from anysim.task.snapshot import spec_hash
+from anysim_schemas.run import RunSpec
 
 STORE = ROOT / "docs" / "tasks.json"
 RUNS = ROOT / "runs" / "gallery"
 ENGINES = ("mujoco", "pybullet", "sapien")
-EPISODES = {"expert": 50, "random": 16}
+EPISODES = {"expert": 50, "shipped": 50, "random": 16}
 """Of each task on each engine."""
 SPLIT = "test"
 PROMISED = {"easy": (0.9, 0.8, 0.8), "medium": (0.7, 0.6, 0.6), "hard": (0.0, 0.0, 0.0)}
@@ -85,10 +87,11 @@ def measure(only: list[str]) -> None:
     left = [cell for cell in cells(list(specs)) if not _enough(known.get(cell.task, {}), cell, specs[cell.task])]
     for number, cell in enumerate(left, 1):
         sys.stderr.write(f"{number} of {len(left)}: {' '.join(cell)}\n")
-        figures = known.get(cell.task, {})
+        figures: Figures = known.get(cell.task, {})
         if figures.get("spec") != specs[cell.task]:
-            figures = {"spec": specs[cell.task], **{policy: {} for policy in EPISODES}}
-        figures[cell.policy][cell.engine] = _benchmarked(cell, specs[cell.task]) or evaluated(cell, specs[cell.task])
+            figures = {"spec": specs[cell.task]}
+        found = _benchmarked(cell, specs[cell.task]) or evaluated(cell, specs[cell.task])
+        figures.setdefault(cell.policy, {})[cell.engine] = found
         known = stored() | {cell.task: figures}
         write_whole(STORE.parent, {STORE.name: json.dumps(known, indent=1, sort_keys=True) + "\n"})
 
@@ -97,9 +100,15 @@ def cells(names: list[str]) -> Iterator[Cell]:
     """What is to be measured of tasks, the shortest first."""
     specs = {name: load(name).spec for name in names}
     for name, spec in sorted(specs.items(), key=lambda entry: entry[1].task.horizon if entry[1].task else 0):
-        has_expert = bool(spec.task and spec.task.expert) or bool(spec.collect and spec.collect.commands)
-        policies = [policy for policy in EPISODES if policy != "expert" or has_expert]
+        policies = [policy for policy in (solver(spec), "random") if policy is not None]
         yield from (Cell(name, policy, engine) for engine in ENGINES for policy in policies)
+
+
+def solver(spec: RunSpec) -> str | None:
+    """The policy that solves a task: its expert, else the learned one that comes with it, if there is either."""
+    if (spec.task and spec.task.expert) or (spec.collect and spec.collect.commands):
+        return "expert"
+    return "shipped" if spec.task and spec.task.shipped else None
 
 
 def _enough(figures: Figures, cell: Cell, spec: str) -> bool:
@@ -156,10 +165,11 @@ def page() -> str:
         task, folder = spec.task, task_path(name).parent.relative_to(ROOT)
         assert task is not None
         commands = spec.collect.commands if spec.collect else ()
-        expert = f"`{task.expert.skill}`" if task.expert else f"{len(commands)} commands" if commands else "none"
+        told = f"{len(commands)} commands" if commands else "learned" if task.shipped else "none"
+        expert = f"`{task.expert.skill}`" if task.expert else told
         robots = ", ".join(dict.fromkeys(one.robot for one in spec.world.robots.values()))
         figures = known.get(name, {})
-        solved = [rate(figures.get("expert", {}).get(engine)) for engine in ENGINES]
+        solved = [rate(figures.get(solver(spec) or "expert", {}).get(engine)) for engine in ENGINES]
         chance = _chance(figures.get("random", {}))
         rows.append([f"[`{name}`](#{name})", difficulty(name), robots, str(task.horizon), expert, *solved, chance])
         if folder.parent.name != family:
@@ -192,9 +202,10 @@ def broken_promises() -> Iterator[str]:
     """The experts that solve less than the difficulty of their task promises."""
     for name, figures in stored().items():
         for engine, least in zip(ENGINES, PROMISED[difficulty(name)], strict=True):
-            won, attempts, _ = figures.get("expert", {}).get(engine, (0, 0, 0))
+            who = "expert" if figures.get("expert") else "shipped"
+            won, attempts, _ = figures.get(who, {}).get(engine, (0, 0, 0))
             if attempts and won < least * attempts:
-                words = f"its expert solves {won} of {attempts} on {engine}, not {least:.0%}"
+                words = f"`--policy {who}` solves {won} of {attempts} on {engine}, not {least:.0%}"
                 yield f"{name} is {difficulty(name)}, and {words}"
 
 

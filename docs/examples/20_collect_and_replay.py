@@ -4,10 +4,10 @@ import tempfile
 from pathlib import Path
 
 import anysim
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.skills.runner import SkillPolicy
+from anysim_recording.collector import Collector
 
 with tempfile.TemporaryDirectory() as folder:
     with anysim.make("pick_cube", num_envs=2, overrides=["record.cameras=[front]", "record.fps=10"]) as env:

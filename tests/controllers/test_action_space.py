@@ -93,7 +93,7 @@ def test_a_flat_action_of_another_width_is_refused() -> None:
 
 
 def test_recordings_name_the_components_by_joint() -> None:
-    from anysim.record.collector import run_header
+    from anysim_recording.collector import run_header
 
     with anysim.make("pick_cube", engine="null", overrides=list(BLIND)) as env:
         names = run_header(env, 0).layout.action

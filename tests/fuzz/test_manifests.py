@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim.record.collector import Collector
 from anysim.record.manifest import read_run
 from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory, world_state
 from anysim.record.replay import begin, rebuild
 from anysim_inspect.verify import verify
+from anysim_recording.collector import Collector
 from tests.fuzz.budget import Tally
 from tests.fuzz.forging import forged_trees, replaced
 from tests.plugins.mcap import conftest as sample

@@ -8,10 +8,10 @@ import pytest
 
 import anysim
 from anysim.errors import SpecError
-from anysim.record.collector import Collector
 from anysim.record.replay import replay
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
+from anysim_recording.collector import Collector
 from tests.managers.test_curriculum import Still
 
 SIZE, HORIZON = 4.0, 10

@@ -8,9 +8,9 @@ import pytest
 
 import anysim
 from anysim.errors import SpecError
-from anysim.record.collector import Collector
 from anysim.record.replay import replay
 from anysim.task.env import TaskEnv
+from anysim_recording.collector import Collector
 from tests.task.helpers import BLOCKS, blocks
 
 GROWING = "task.curriculum={far: {widens: [layout.red.x, task.command.goal.height], episodes: 2, step: 0.25}}"

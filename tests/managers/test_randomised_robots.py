@@ -345,9 +345,9 @@ class Tape:
 def test_a_record_says_what_was_drawn_and_is_replayed_to_the_bit(engine: str, tmp_path: Any) -> None:
     """Noise and delays of the actions come again from the episode's seed: the record has the actions as given."""
     pytest.importorskip("anysim_mcap")
-    from anysim.record.collector import Collector
     from anysim.record.manifest import read_manifest
     from anysim.record.replay import replay
+    from anysim_recording.collector import Collector
 
     with arm(2, *TERMS, "task.horizon=6", "record.keep=all", engine=engine) as env:
         results = list(Collector(env, Tape(env), tmp_path, episodes=2, seed=1).run())

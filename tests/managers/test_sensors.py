@@ -9,13 +9,13 @@ import pytest
 import anysim
 from anysim.errors import AnysimError, SnapshotError
 from anysim.managers.sensors import EVERY_SENSOR
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.sensors.base import SensorField
 from anysim.task.env import TaskEnv
 from anysim.task.snapshot import EnvSnapshot
 from anysim_inspect.cli.check import report_on
+from anysim_recording.collector import Collector
 from tests.schemas.test_every_key import Still
 
 NOISY = {

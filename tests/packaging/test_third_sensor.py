@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import anysim
 from anysim_barometer import barometer
-from anysim.record.collector import Collector
+from anysim_recording.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.testing.sensors import check_sensor
 

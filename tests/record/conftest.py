@@ -11,8 +11,8 @@ import pytest
 from anysim.record.columns import EpisodeColumns
 from anysim.record.frame import RecordedFrame
 from anysim.record.header import ArrayLayout, EpisodeHeader, Header, RunHeader, StateLayout
-from anysim.record.recorder import Recorder
 from anysim.record.writer import ImageWriter, TrajectoryWriter, WrittenFile
+from anysim_recording.recorder import Recorder
 
 LAYOUT = StateLayout(
     bodies=("cube",),

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import anysim
-from anysim.record.collector import Collector
+from anysim_recording.collector import Collector
 from anysim_sharded.engine import ShardedEngine, WorkerWarning
 from tests.runtime import light
 

@@ -9,11 +9,11 @@ import pytest
 import anysim
 from anysim import registry
 from anysim.errors import RecordError
-from anysim.record.collector import Collector
 from anysim.record.columns import EpisodeColumns
 from anysim.record.manifest import read_manifest
 from anysim.record.writer import TrajectoryWriter, WrittenFile
 from anysim.skills.runner import SkillPolicy
+from anysim_recording.collector import Collector
 from tests.task.helpers import BLIND
 
 SHORT = [*BLIND, "record.keep=all", "task.horizon=6"]

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from anysim.errors import PluginFailure, RecordError
-from anysim.record import commit as protocol, committer
+from anysim.record import commit as protocol
 from anysim.record.header import CameraInfo, EpisodeHeader
 from anysim.record.manifest import read_manifest
-from anysim.record.recorder import Recorder
 from anysim.record.writer import TrajectoryWriter, WrittenFile
+from anysim_recording import committer
+from anysim_recording.recorder import Recorder
 
 FULL = OSError(errno.ENOSPC, "No space left on device")
 

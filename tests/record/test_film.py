@@ -17,7 +17,6 @@ from anysim import registry
 from anysim.api import load
 from anysim.engine.base import SimEngine
 from anysim.errors import RecordError, SpecError
-from anysim.record.collector import Collector, run_header
 from anysim.record.columns import EpisodeColumns
 from anysim.record.film import draw_recorded, film_mode, hindrances
 from anysim.record.header import EpisodeHeader, Header
@@ -30,6 +29,7 @@ from anysim.task.terms import TERMS
 from anysim.testing.engines import require_drawing
 from anysim_inspect.cli.check import report_on
 from anysim_inspect.verify import verify
+from anysim_recording.collector import Collector, run_header
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 CAMERAS = ("front", "wrist")

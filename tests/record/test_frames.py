@@ -10,7 +10,7 @@ from anysim.model.world import Actuator, Body, BodyKind, Camera, ControlMode, Jo
 from anysim.record.frame import FrameBatch, state_digest, state_rows
 from anysim.record.header import CameraInfo, EpisodeHeader, camera_info, state_layout
 from anysim.record.manifest import read_manifest
-from anysim.record.recorder import Recorder
+from anysim_recording.recorder import Recorder
 
 
 @pytest.fixture

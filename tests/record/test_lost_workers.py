@@ -9,10 +9,10 @@ import pytest
 
 import anysim
 from anysim.conventions import Array
-from anysim.record.collector import RERUNS, Collector, EpisodeResult
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
+from anysim_recording.collector import RERUNS, Collector, EpisodeResult
 from anysim_sharded.engine import ShardedEngine, WorkerWarning
 from tests.task.helpers import BLIND
 

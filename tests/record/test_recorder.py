@@ -11,7 +11,7 @@ from anysim.errors import RecordError
 from anysim.record.frame import state_digest
 from anysim.record.header import CameraInfo, EpisodeHeader
 from anysim.record.manifest import read_manifest, read_run
-from anysim.record.recorder import Recorder
+from anysim_recording.recorder import Recorder
 
 
 def episode(env=0, number=0, **more):

@@ -7,9 +7,9 @@ import pytest
 
 import anysim
 from anysim.errors import RecordError
-from anysim.record.collector import Collector
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
+from anysim_recording.collector import Collector
 from tests import forked
 from tests.task.helpers import BLIND
 

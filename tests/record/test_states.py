@@ -5,9 +5,9 @@ import pytest
 
 import anysim
 from anysim.errors import RecordError
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory, world_state
 from anysim.skills.runner import SkillPolicy
+from anysim_recording.collector import Collector
 from tests.task.helpers import BLIND
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.skills.runner import SkillPolicy
+from anysim_recording.collector import Collector
 from tests.task.helpers import arm
 
 VARIED = [

@@ -8,8 +8,8 @@ from anysim import registry
 from anysim.errors import PluginError, RecordError
 from anysim.record.manifest import read_manifest, read_run
 from anysim.record.reader import open_trajectory
-from anysim.record.recorder import Recorder
 from anysim_inspect.verify import verify, verify_run
+from anysim_recording.recorder import Recorder
 
 INSTALLED = registry.load
 

@@ -15,12 +15,12 @@ import anysim
 from anysim import registry
 from anysim.api import compile_world, load
 from anysim.errors import AnysimError
-from anysim.record.collector import Collector
 from anysim.record.manifest import read_manifest
 from anysim.record.names import trajectories
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_drawing
+from anysim_recording.collector import Collector
 from anysim_schemas.base import Spec
 from anysim_schemas.run import RunSpec
 from tests.schemas.keys import layout, run, sensors, world

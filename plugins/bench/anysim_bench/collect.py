@@ -14,10 +14,10 @@ from statistics import median
 from typing import NamedTuple
 
 from anysim.engine.base import EnvIds
-from anysim.record.collector import Collector
 from anysim.record.names import EPISODES, trajectory_name
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
+from anysim_recording.collector import Collector
 
 ENGINE_SHARE_GOAL = 0.60
 """Of a collection without images in 16 envs on MuJoCo."""

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import typer
 
 from anysim.cli.output import print_table
-from anysim.record.collector import EpisodeResult
 from anysim_collect.report import MIXTURE_COLUMNS, PAGE_FILE, mixture_rows
 from anysim_collect.tally import Tally
+from anysim_recording.collector import EpisodeResult
 
 MOST_ROWS = 200
 """Episodes that are listed one by one; of more the report tells."""

@@ -8,9 +8,9 @@ import typer
 
 from anysim.cli.output import interactive
 from anysim.math.statistics import wilson
-from anysim.record.collector import EpisodeResult
 from anysim_collect.tally import ordered
 from anysim_collect.turns import Collection
+from anysim_recording.collector import EpisodeResult
 
 REFRESH = 4
 """[Hz] of the table."""

@@ -15,10 +15,10 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.randomization.draw import is_random
 from anysim.randomization.streams import episode_seed
-from anysim.record.collector import Collector, Policy
 from anysim.record.names import EPISODES, MANIFEST_FILE, trajectory_name
 from anysim.record.reader import open_trajectory
 from anysim.task.env import TaskEnv
+from anysim_recording.collector import Collector, Policy
 
 SAME, CHANGED = 0, 1
 """The members of a pair: env 2k and 2k + 1."""

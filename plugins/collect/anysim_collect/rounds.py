@@ -15,12 +15,12 @@ from tempfile import gettempdir, mkdtemp
 from typing import NamedTuple
 
 from anysim.api import make
-from anysim.record.collector import Collector, EpisodeResult
 from anysim.record.incoming import FileLock, remove
 from anysim.record.manifest import RunRecord, read_run
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim_collect.report import planned
+from anysim_recording.collector import Collector, EpisodeResult
 
 
 class Job(NamedTuple):

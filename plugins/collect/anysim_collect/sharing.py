@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from anysim.api import compile_world, load
-from anysim.record.collector import EpisodeResult, resumed
 from anysim.record.commit import describe_run, disk_trouble, fsync, publish_all, write_durably
 from anysim.record.incoming import Incoming, claim
 from anysim.record.manifest import RunRecord
@@ -19,6 +18,7 @@ from anysim_collect.report import mixed, report_of, write_report
 from anysim_collect.rounds import EndedEpisode, Job, Round, running_rounds
 from anysim_collect.tally import Tally
 from anysim_processes.executors import share
+from anysim_recording.collector import EpisodeResult, resumed
 
 Show = Callable[[str, EpisodeResult], None]
 """Called with the task once an episode has ended, and is on the disk where it is kept."""

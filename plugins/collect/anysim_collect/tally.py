@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from anysim.math.statistics import wilson
-from anysim.record.collector import EpisodeResult
+from anysim_recording.collector import EpisodeResult
 
 
 @dataclass

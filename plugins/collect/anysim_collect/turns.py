@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from anysim.planning.service import PlannerService
-from anysim.record.collector import Collector, EpisodeResult
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim_collect.mixture import Limits, size_of
 from anysim_collect.tally import Tally
+from anysim_recording.collector import Collector, EpisodeResult
 
 
 class Collection:

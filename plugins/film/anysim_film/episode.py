@@ -10,9 +10,9 @@ from anysim.conventions import Array
 from anysim.record.film import camera_of, capture_of
 from anysim.record.header import Header
 from anysim.record.manifest import CameraEntry, Manifest
-from anysim.record.trajectory_files import camera_entries
 from anysim.record.writer import TrajectoryWriter
 from anysim.task.env import TaskEnv
+from anysim_recording.trajectory_files import camera_entries
 
 
 class Moments(NamedTuple):

@@ -9,10 +9,10 @@ from statistics import median
 
 from anysim.api import make
 from anysim.math.statistics import wilson
-from anysim.record.collector import Collector, EpisodeResult
 from anysim.skills.runner import SkillPolicy
 from anysim_parity.engines import guarded
 from anysim_parity.result import Gap, Layer, Measure, Plot, Series
+from anysim_recording.collector import Collector, EpisodeResult
 from anysim_schemas.load import LoadedRun
 
 MAX_ENVS = 8

@@ -9,7 +9,7 @@ import typer
 from anysim.cli.options import Engine, Overrides, Seed, Task
 
 if TYPE_CHECKING:
-    from anysim.record.collector import EpisodeResult
+    from anysim_recording.collector import EpisodeResult
 
 
 def teleop(

@@ -11,7 +11,6 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import TaskError
-from anysim.record.collector import STATE_FIELDS, EpisodeResult, run_header
 from anysim.record.commit import disk_trouble
 from anysim.record.film import camera_of, capture_of, draw_recorded, film_mode
 from anysim.record.frame import RecordedFrame, state_rows
@@ -19,12 +18,13 @@ from anysim.record.header import EpisodeHeader
 from anysim.record.incoming import claim
 from anysim.record.manifest import read_manifest
 from anysim.record.names import EPISODES, trajectory_name
-from anysim.record.recorder import Recorder
 from anysim.record.streams import make_sources
 from anysim.record.writer import make_writer
 from anysim.task.bindings import bind_term
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
+from anysim_recording.collector import STATE_FIELDS, EpisodeResult, run_header
+from anysim_recording.recorder import Recorder
 from anysim_teleop.device import Button, DeviceInput, InputDevice, Job, Moment
 from anysim_teleop.drive import Drives
 

@@ -5,10 +5,10 @@ from pathlib import Path
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.managers.camera import interval
-from anysim.record.collector import run_header
 from anysim.record.header import CameraInfo, EpisodeHeader, Header
 from anysim.record.writer import make_writer
 from anysim.task.env import TaskEnv
+from anysim_recording.collector import run_header
 
 
 class Video:

@@ -10,7 +10,6 @@ from PIL import Image
 
 import anysim
 from anysim.errors import RecordError
-from anysim.record.collector import Collector
 from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
@@ -21,6 +20,7 @@ from anysim_annotation.render import AnnotationMaker
 from anysim_annotation.sheet import read_annotations
 from anysim_export.job import export
 from anysim_film.stage import FilmOrder
+from anysim_recording.collector import Collector
 from tests.plugins.annotation.scenes import decoded
 
 pytestmark = pytest.mark.xdist_group("coco")

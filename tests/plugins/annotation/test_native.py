@@ -10,7 +10,6 @@ import pytest
 import anysim
 from anysim.math import pose as P
 from anysim.model.frames import find_frame
-from anysim.record.collector import Collector
 from anysim.record.names import trajectories
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.skills.runner import SkillPolicy
@@ -22,6 +21,7 @@ from anysim_annotation.render import AnnotationMaker
 from anysim_annotation.segments import Intentions
 from anysim_annotation.tools import placed
 from anysim_film.stage import FilmOrder
+from anysim_recording.collector import Collector
 
 SIZE = (32, 24)
 NAMES = "skeleton,eef_waypoint,obj_bbox,affordance,nav_point,camera"

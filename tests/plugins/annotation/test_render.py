@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 import anysim
 from anysim.errors import AnysimError, RecordError
-from anysim.record.collector import Collector
 from anysim.record.commit import describe
 from anysim.record.names import trajectories
 from anysim.skills.runner import SkillPolicy
@@ -22,6 +21,7 @@ from anysim_annotation.render import AnnotationMaker, annotate
 from anysim_annotation.sheet import SHEET_FILE, read_annotations
 from anysim_film.stage import FilmOrder
 from anysim_inspect.verify import verify
+from anysim_recording.collector import Collector
 
 SMALL = FilmOrder(("front", "wrist"), size=(48, 36), fps=25.0)
 NAMES = "boxes_2d,boxes_3d,camera,depth,flow,instance,normals,point_cloud,semantic"

@@ -6,13 +6,13 @@ import pytest
 import anysim
 from anysim.errors import SpecError
 from anysim.math import pose as P
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.testing.engines import require_engine
 from anysim_avatars.hold import FREE, GIVEN, HELD, Hold
 from anysim_avatars.terms import AvatarView
 from anysim_avatars.waits import AwaitClear
+from anysim_recording.collector import Collector
 from tests.plugins.avatars.people import avatars, joints, run_of, wait
 from tests.schemas.test_every_key import Still
 from tests.tasks.states import blind

@@ -12,11 +12,11 @@ import pytest
 
 import anysim
 from anysim.engine.factory import create_simulation
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.testing.audit import audit
 from anysim.testing.engines import require_engine
+from anysim_recording.collector import Collector
 from tests.plugins.avatars.people import avatars, lived, run_of, wait
 from tests.schemas.test_every_key import Still
 

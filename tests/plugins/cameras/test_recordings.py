@@ -10,13 +10,13 @@ import typer
 from typer.testing import CliRunner
 
 import anysim
-from anysim.record.collector import Collector
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.record.replay import replay
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_drawing
 from anysim_collect import commands
+from anysim_recording.collector import Collector
 from tests.runtime.light import REAL
 
 EVENTS = Path(__file__).parents[3] / "docs" / "examples" / "events.yaml"

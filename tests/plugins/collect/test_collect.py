@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 from anysim.errors import RecordError, TaskError
 from anysim.planning.service import ServiceCounts
-from anysim.record.collector import EpisodeResult
 from anysim_collect import mixture as mixtures
 from anysim_collect.cli import run as cli
 from anysim_collect.mixture import Limits, Part, mixture, parse_bytes, shared_out
@@ -21,6 +20,7 @@ from anysim_collect.page import page
 from anysim_collect.report import read_report, report_of, write_report
 from anysim_collect.tally import Tally
 from anysim_collect.turns import Collection, collect
+from anysim_recording.collector import EpisodeResult
 
 WORLDS = Path(__file__).parents[1] / "skills/worlds"
 DRAWN, BEHIND_WALL = (str(WORLDS / name) for name in ("drawn_commands.yaml", "behind_wall.yaml"))

@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 import anysim
-from anysim.record.collector import Collector
 from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_drawing
+from anysim_recording.collector import Collector
 
 SMALL = (
     "record.cameras=[front,wrist]",

@@ -11,7 +11,6 @@ import pytest
 
 import anysim
 from anysim.errors import RecordError
-from anysim.record.collector import Collector
 from anysim.record.incoming import FileLock
 from anysim.record.manifest import read_manifest
 from anysim.record.names import MANIFEST_FILE, trajectories
@@ -25,6 +24,7 @@ from anysim_film.sheet import FILM_FILE, read_sheet
 from anysim_film.stage import FilmOrder
 from anysim_inspect.verify import verify
 from anysim_mcap.video import images
+from anysim_recording.collector import Collector
 from tests import forked
 from tests.record.test_film import SEEN, filmed_env, recorded as played
 

@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 import anysim
 from anysim.cli.options import option_values
 from anysim.errors import PluginError, RecordError, TaskError
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
 from anysim_learning import checkpoint, cli
 from anysim_learning.batch import Batch
 from anysim_learning.demonstrations import Demonstrations
+from anysim_recording.collector import Collector
 from tests.tasks.states import blinding
 
 QUIET = ["record.cameras=[]"]

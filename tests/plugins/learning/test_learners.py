@@ -17,12 +17,12 @@ from typer.testing import CliRunner
 import anysim
 from anysim.errors import EngineError, RecordError, TaskError
 from anysim.record import incoming
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_drawing, require_engine
 from anysim_learning import cli
+from anysim_recording.collector import Collector
 
 torch = pytest.importorskip("torch", reason="the learners need torch: make test-learning")
 pytestmark = pytest.mark.full

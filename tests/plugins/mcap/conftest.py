@@ -10,8 +10,8 @@ import pytest
 
 from anysim.record.frame import RecordedFrame
 from anysim.record.header import ArrayLayout, CameraInfo, EpisodeHeader, RunHeader, StateLayout
-from anysim.record.recorder import Recorder
 from anysim.record.writer import make_writer
+from anysim_recording.recorder import Recorder
 
 LAYOUT = StateLayout(
     bodies=("cube", "panda.link0", "panda.hand"),

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 import anysim
-from anysim.record.collector import Collector, EpisodeResult
 from anysim.task.env import TaskEnv
+from anysim_recording.collector import Collector, EpisodeResult
 
 WORLD = Path(__file__).with_name("everything.yaml")
 

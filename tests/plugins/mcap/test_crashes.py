@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from anysim.record.recorder import Recorder
 from anysim.record.writer import make_writer
 from anysim_inspect.verify import verify_run
+from anysim_recording.recorder import Recorder
 from tests.small_disk import small_disk
 
 SAMPLE = str(Path(__file__).with_name("conftest.py"))
@@ -21,7 +21,7 @@ sample = sys.modules["sample"] = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(sample)
 from pathlib import Path
 from anysim.errors import RecordError
-from anysim.record.recorder import Recorder
+from anysim_recording.recorder import Recorder
 from anysim_inspect.verify import verify_run
 from anysim.record.writer import make_writer
 out = Path(sys.argv[2])

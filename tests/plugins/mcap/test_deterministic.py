@@ -13,7 +13,7 @@ sample = sys.modules["sample"] = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(sample)
 import numpy as np
 from anysim.record.header import CameraInfo
-from anysim.record.recorder import Recorder
+from anysim_recording.recorder import Recorder
 from anysim.record.writer import make_writer
 cameras = {**sample.CAMERAS, "wide": CameraInfo(width=320, height=240)}
 noise = np.random.default_rng(0)

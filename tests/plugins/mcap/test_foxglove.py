@@ -11,7 +11,6 @@ from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 import anysim
 from anysim.errors import RecordError
 from anysim.math import pose as P
-from anysim.record.collector import Collector
 from anysim.record.header import StreamInfo
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.record.streams import StreamRow
@@ -20,6 +19,7 @@ from anysim_mcap.foxglove.marks import has_marks, marks
 from anysim_mcap.foxglove.scans import Rays, scan_message
 from anysim_mcap.foxglove.scene import scene_update
 from anysim_mcap.foxglove.video import KEYFRAMES, h264
+from anysim_recording.collector import Collector
 from tests.plugins.mcap.everything import Still
 from tests.plugins.mcap.exported import Heard, assert_consistent, heard
 from tests.plugins.sensors.declared import SENSORS, world

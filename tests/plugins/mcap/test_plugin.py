@@ -14,7 +14,7 @@ def test_writer_and_reader_have_one_name():
 
 def test_importing_is_light():
     code = (
-        "import sys, anysim.record.recorder, anysim_inspect.verify, anysim_mcap.writer, anysim_mcap.reader;"
+        "import sys, anysim_recording.recorder, anysim_inspect.verify, anysim_mcap.writer, anysim_mcap.reader;"
         "print(sorted({'av', 'mcap', 'google.protobuf', 'zstandard', 'mujoco', 'trimesh'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"

@@ -7,9 +7,9 @@ from anysim.errors import RecordError
 from anysim.record.frame import RecordedFrame
 from anysim.record.header import ArrayLayout, EpisodeHeader, RunHeader, StateLayout
 from anysim.record.reader import open_trajectory
-from anysim.record.recorder import Recorder
 from anysim.record.writer import make_writer
 from anysim_inspect.verify import verify
+from anysim_recording.recorder import Recorder
 
 
 def same_bits(a, b):

@@ -16,10 +16,10 @@ from anysim.record.commit import describe
 from anysim.record.header import StreamInfo
 from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory
-from anysim.record.recorder import Recorder
 from anysim.record.streams import StreamPart, StreamRow, StreamSource, make_sources
 from anysim.record.writer import TrajectoryWriter, WrittenFile, make_writer
 from anysim_inspect.verify import verify, verify_run
+from anysim_recording.recorder import Recorder
 from tests.plugins.mcap.everything import WORLD, made
 
 INFOS = {

@@ -9,13 +9,13 @@ import pytest
 
 import anysim
 from anysim.errors import EngineError, SpecError
-from anysim.record.collector import Collector
 from anysim.record.film import film_mode
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.testing.engines import require_drawing, require_engine
 from anysim_particles.blocks import scattered
 from anysim_particles.spec import SandSpec
+from anysim_recording.collector import Collector
 from tests.contract.suite_runs import run
 from tests.plugins.particles.matters import ENGINES, begun, in_tank, run_of, wait
 from tests.schemas.test_every_key import Still

@@ -12,11 +12,11 @@ import anysim
 from anysim.conventions import Array
 from anysim.errors import SpecError
 from anysim.math import pose as P
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
+from anysim_recording.collector import Collector
 from tests.plugins.sensors.declared import SENSORS, world
 from tests.schemas.test_every_key import Still
 

@@ -11,12 +11,12 @@ from anysim import make, registry
 from anysim.api import compile_world, dry_run, load
 from anysim.errors import SpecError
 from anysim.plugin_parameters import parameters
-from anysim.record.collector import Collector
 from anysim.skills.bank import read_bank
 from anysim.skills.living_bank import LivingBank
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
+from anysim_recording.collector import Collector
 from anysim_skills.grasping import banked
 from tests.plugins.skills.banks import DOWN, badly_chosen, cube_bank, shifted, task, tilted, written
 from tests.plugins.skills.test_manipulation import WORLDS

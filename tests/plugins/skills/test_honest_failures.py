@@ -8,11 +8,11 @@ import pytest
 from anysim import make
 from anysim.planning.motion import PlanAnswer, PlanRequest, PlanStatus
 from anysim.planning.service import SERVICE_VARIABLE
-from anysim.record.collector import Collector
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SETTLE, SkillPolicy
 from anysim.testing.engines import require_engine
 from anysim_planning.rrt import RrtPlanner
+from anysim_recording.collector import Collector
 from tests.plugins.skills.test_manipulation import STEPS, WORLDS
 from tests.plugins.skills.test_pick import rollout
 

@@ -10,13 +10,13 @@ from typer.testing import CliRunner
 
 from anysim import make
 from anysim.planning.service import SERVICE_VARIABLE
-from anysim.record.collector import Collector
 from anysim.record.manifest import read_manifest
 from anysim.record.names import EPISODES, trajectory_name
 from anysim.record.replay import replay
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from anysim_collect.cli.run import run
+from anysim_recording.collector import Collector
 from anysim_skills.planning import WORKERS_VARIABLE
 
 WALL = Path(__file__).parent / "worlds/behind_wall.yaml"

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from anysim import make
-from anysim.record.collector import Collector, EpisodeResult
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from anysim_planning import queued
 from anysim_planning.processes import ProcessService
 from anysim_planning.threads import ThreadedService
+from anysim_recording.collector import Collector, EpisodeResult
 from anysim_skills import planned_moves, planning
 from tests.plugins.sharded.shards_help import children
 from tests.plugins.skills.faulty_planners import BEYOND, FAULT, WALL, faulty

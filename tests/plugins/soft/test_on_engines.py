@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.testing.engines import require_drawing, require_engine
+from anysim_recording.collector import Collector
 from tests.contract.suite_runs import run
 from tests.plugins.soft.softs import ALL, ENGINES, begun, run_of, wait, with_ball
 from tests.schemas.test_every_key import Still

@@ -8,12 +8,12 @@ import pytest
 
 import anysim
 from anysim.errors import RecordError, TaskError
-from anysim.record.collector import EpisodeResult
 from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.task.env import TaskEnv
 from anysim_inspect.verify import verify
+from anysim_recording.collector import EpisodeResult
 from anysim_teleop.device import Button, DeviceInput, InputDevice, Moment
 from anysim_teleop.drive import LEAD
 from anysim_teleop.script import ScriptDevice

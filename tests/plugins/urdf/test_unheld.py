@@ -13,7 +13,7 @@ from anysim.api import compile_world
 from anysim.assets.model import Fate, ImportedModel
 from anysim.compile.edit import without_entity
 from anysim.errors import AssetError
-from anysim.record.collector import run_header
+from anysim_recording.collector import run_header
 from anysim_urdf import coverage
 from anysim_urdf.coverage import ROWS
 

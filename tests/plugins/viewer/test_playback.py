@@ -8,11 +8,11 @@ import pytest
 
 import anysim
 from anysim.errors import RecordError
-from anysim.record.collector import Collector
 from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
 from anysim_film.stage import FilmOrder
+from anysim_recording.collector import Collector
 from anysim_viewer.gate import Access
 from anysim_viewer.page import Page
 from anysim_viewer.playback import Playback

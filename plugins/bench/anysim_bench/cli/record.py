@@ -28,9 +28,9 @@ def record(
     """
     from anysim.cli.output import print_json
     from anysim.engine.factory import default_engine
-    from anysim.record.committer import QUEUE_BYTES
     from anysim_bench.collect import CollectCost, collect_costs, typical
     from anysim_bench.rows import Rows
+    from anysim_recording.committer import QUEUE_BYTES
 
     title = (
         f"Recording {task}, as shares of wall time; at most {SHARE_GOAL:.0%} without cameras, and {QUEUE_BYTES >> 20} "

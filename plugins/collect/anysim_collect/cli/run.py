@@ -12,11 +12,11 @@ from anysim_collect.mixture import Balance
 from anysim_processes.options import PROCESSES, Executor, Workers
 
 if TYPE_CHECKING:
-    from anysim.record.collector import EpisodeResult
     from anysim.task.env import TaskEnv
     from anysim_collect.endings import Ran
     from anysim_collect.mixture import Limits, Part
     from anysim_collect.turns import Collection
+    from anysim_recording.collector import EpisodeResult
 
 Tasks = Annotated[
     list[str],

@@ -24,16 +24,16 @@ from anysim.errors import RecordError, listing
 from anysim.math.matrix import blas_kernel
 from anysim.record.columns import ColumnStore, EpisodeColumns, check_columns
 from anysim.record.commit import describe_run, disk_trouble
-from anysim.record.committer import Committer
-from anysim.record.episode import BatchChecks, Film, OpenEpisode, batch_of
 from anysim.record.frame import FrameBatch, RecordedFrame
 from anysim.record.header import EpisodeHeader, Header, RunHeader
 from anysim.record.incoming import Incoming
 from anysim.record.json import plain
 from anysim.record.names import EPISODES, parse_trajectory, trajectories, trajectory_name
 from anysim.record.streams import StreamPart, StreamSource, blame, close_sources
-from anysim.record.trajectory_files import Ending, PendingCommit, TrajectoryFiles
 from anysim.record.writer import StreamWriter, TrajectoryWriter
+from anysim_recording.committer import Committer
+from anysim_recording.episode import BatchChecks, Film, OpenEpisode, batch_of
+from anysim_recording.trajectory_files import Ending, PendingCommit, TrajectoryFiles
 
 
 def _write_part(part: StreamPart, blamed: registry.Blame, writer: StreamWriter) -> None:

@@ -18,7 +18,6 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import RecordError
-from anysim.record.collect_times import CollectTimes
 from anysim.record.commit import disk_trouble
 from anysim.record.film import camera_of, draw_recorded, film_mode
 from anysim.record.frame import NOTHING, FrameBatch, state_batch
@@ -26,12 +25,13 @@ from anysim.record.header import EpisodeHeader, RunHeader, package_versions, sta
 from anysim.record.incoming import claim
 from anysim.record.manifest import read_manifest
 from anysim.record.names import EPISODES, trajectory_name
-from anysim.record.recorder import Recorder
 from anysim.record.streams import make_sources
-from anysim.record.trajectory_files import PendingCommit
 from anysim.record.writer import make_writer
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
+from anysim_recording.collect_times import CollectTimes
+from anysim_recording.recorder import Recorder
+from anysim_recording.trajectory_files import PendingCommit
 
 STATE_FIELDS = ("joint_pos", "joint_vel", "body_pose", "body_twist", "control_position")
 """What is recorded of the state in each step."""

@@ -19,8 +19,8 @@ from anysim.record.columns import EpisodeColumns
 from anysim.record.commit import disk_trouble, taken
 from anysim.record.header import RunHeader
 from anysim.record.names import EPISODES
-from anysim.record.trajectory_files import Ending, ManifestText, PendingCommit, TrajectoryFiles
 from anysim.record.writer import PartWriter, TrajectoryWriter
+from anysim_recording.trajectory_files import Ending, ManifestText, PendingCommit, TrajectoryFiles
 
 QUEUE_BYTES = 64 << 20
 """What waits for the thread may hold as much memory; who hands over more waits."""
