@@ -17,6 +17,7 @@ STRANDS := .venv-strands/installed
 OPENENV := .venv-openenv/installed
 RERUN := .venv-rerun/installed
 MCPOLD := .venv-mcp-old/installed
+RAY := .venv-ray/installed
 NODE := .node-mcap/installed
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
@@ -37,7 +38,7 @@ $(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % s
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-openenv test-rerun test-viewers test-mcp-old check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-openenv test-rerun test-viewers test-mcp-old test-ray check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -167,6 +168,14 @@ $(MCPOLD): $(TEST)
 	.venv-mcp-old/bin/python -m pip install --quiet "mcp>=1.30,<2"
 	@touch $@
 
+test-ray: $(RAY)  ## run jobs on a Ray cluster of two nodes on this machine, and kill its nodes, in an environment with Ray
+	.venv-ray/bin/python -m pytest -n 0 -s tests/plugins/ray $(ARGS)
+
+$(RAY): $(TEST) plugins/ray/pyproject.toml
+	$(call beside,.venv-ray)
+	.venv-ray/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/ray ray)
+	@touch $@
+
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site
 check: $(CHECKS)  ## lint, format, types, layers, style and generated files (make -k check: do not stop at the first)
 .PHONY: $(CHECKS)
@@ -242,5 +251,5 @@ wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.m
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
-	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-strands .venv-openenv .venv-rerun .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-strands .venv-openenv .venv-rerun .venv-ray .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

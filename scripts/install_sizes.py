@@ -57,6 +57,7 @@ WORDS = {
     "planning": "collision-free motion, planned beside the simulation",
     "policy": "learned policies (ONNX) as controllers",
     "pybullet": "the engine PyBullet",
+    "ray": "`--executor ray`: runs, evaluations, benchmarks, exports and films on a Ray cluster, with Ray",
     "robots": "the robot catalogue with its files, `anysim robot`, `anysim gallery`",
     "sapien": "the engine SAPIEN",
     "sensors": "IMUs, forces, tracked frames; LiDARs, height scans, depth, occupancy, equal on every engine",

@@ -18,6 +18,7 @@ UNWANTED = frozenset(
         "gymnasium-robotics",
         "lerobot",  # each of its releases wants torch, and other versions of what is pinned here
         "mani-skill",
+        "ray",  # 250 MB, for its own tests alone
         "rerun-sdk",  # 800 MB, for its own tests alone
         "rsl-rl-lib",
         "stable-baselines3",

@@ -20,7 +20,7 @@ from anysim_annotation.sheet import SHEET_FILE, SUFFIX, AnnotationSheet, CameraS
 from anysim_annotation.view import Source
 from anysim_film.commit import move_in, workspace
 from anysim_film.stage import FilmOrder, Stage, facts_of, refuse_damage, refuse_unknown_cameras
-from anysim_processes.jobs import treat_all
+from anysim_processes.executors import share
 from anysim_schemas.load import LoadedRun
 
 
@@ -160,13 +160,18 @@ class AnnotationMaker:
 
 
 def annotate(
-    work: Sequence[tuple[Path, Path | None]], order: FilmOrder, text: str, source: Source, jobs: int = 1
+    work: Sequence[tuple[Path, Path | None]],
+    order: FilmOrder,
+    text: str,
+    source: Source,
+    jobs: int | None = None,
+    executor: str | None = None,
 ) -> Iterator[Annotated]:
     """Annotate trajectories, each into its directory, as `anysim render --annotate` does; yields each when done.
 
-    With more than one process (`jobs`) they come in any order, with the same labels.
+    With more than one process (`jobs`), or by the workers of an executor, they come in any order, with the same labels.
     """
-    return treat_all(work, partial(_annotating, order, read_orders(text), source), jobs)
+    return share(executor, work, partial(_annotating, order, read_orders(text), source), jobs)
 
 
 @contextmanager

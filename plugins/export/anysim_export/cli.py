@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from anysim.cli.options import AsJson, option_values
+from anysim_processes.options import Executor
 
 if TYPE_CHECKING:
     from anysim_export.parts import Told
@@ -27,7 +28,13 @@ def export(
     failed_too: Annotated[
         bool, typer.Option("--failed-too", help="Export committed episodes too that did not succeed.")
     ] = False,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes that write episodes.")] = 1,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs", "-j", min=1, help="Processes that write episodes. [default: 1, or as many as --executor has]"
+        ),
+    ] = None,
+    executor: Executor = None,
     json: AsJson = False,
 ) -> None:
     """Write the committed trajectories of runs as a data set that trainers read.
@@ -45,7 +52,7 @@ def export(
 
     with _Bar(lambda total: counting("episodes", total, quiet=json)) as bar:
         options = option_values(option, "images=false")
-        done = write(directories, to, out, options, failed_too=failed_too, jobs=jobs, tell=bar.begin)
+        done = write(directories, to, out, options, failed_too=failed_too, jobs=jobs, executor=executor, tell=bar.begin)
     if json:
         print_json({**done._asdict(), "directory": str(done.directory)})
         return

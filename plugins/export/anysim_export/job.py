@@ -43,6 +43,13 @@ class Exported(NamedTuple):
     omitted: dict[str, str]
 
 
+class Hands(NamedTuple):
+    """What writes episodes: so many processes, or the workers of an executor."""
+
+    jobs: int | None
+    executor: str | None
+
+
 def export(
     runs: Sequence[Path],
     to: str,
@@ -50,7 +57,8 @@ def export(
     options: Mapping[str, Any] | None = None,
     *,
     failed_too: bool = False,
-    jobs: int = 1,
+    jobs: int | None = None,
+    executor: str | None = None,
     tell: Callable[[int], Told] | None = None,
 ) -> Exported:
     """Write committed trajectories as a data set.
@@ -63,8 +71,9 @@ def export(
         out: directory of the data set, which must not exist, or be the same export.
         options: the exporter's.
         failed_too: export episodes too that did not succeed.
-        jobs: processes that write episodes; the bytes are the same. A program that asks for more than one guards its
-            main module (`if __name__ == "__main__"`), which each of them imports.
+        jobs: processes that write episodes, by default one; the bytes are the same. A program that asks for more than
+            one guards its main module (`if __name__ == "__main__"`), which each of them imports.
+        executor: whose workers write them in place of such processes.
         tell: asked for a `Told` with the number of episodes to write.
 
     Raises:
@@ -75,7 +84,7 @@ def export(
     exporter, said = made(to, options or {})
     with closing(exporter):
         _check_needs(to, exporter.needs)
-        return _export(exporter, said, runs, to, out, failed_too, jobs, tell)
+        return _export(exporter, said, runs, to, out, failed_too, Hands(jobs, executor), tell)
 
 
 def _export(
@@ -85,7 +94,7 @@ def _export(
     to: str,
     out: Path,
     failed_too: bool,
-    jobs: int,
+    hands: Hands,
     tell: Callable[[int], Told] | None,
 ) -> Exported:
     paths, left_out = _chosen(runs, failed_too)
@@ -111,7 +120,7 @@ def _export(
             resumed = _begin(aside, sheet)
             told = (lambda line, standing: None) if tell is None else tell(len(paths))
             with registry.using("exporters", to, (OSError,)):
-                parts = write_parts(aside / PARTS, to, [path for path, _ in paths], data, jobs, told)
+                parts = write_parts(aside / PARTS, to, [path for path, _ in paths], data, told, *hands)
                 whole = aside / WHOLE
                 shutil.rmtree(whole, ignore_errors=True)
                 whole.mkdir()

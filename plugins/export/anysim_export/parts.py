@@ -1,6 +1,7 @@
 """Episodes of an export, each in a folder that is written whole or not at all, by one process or several."""
 
 import os
+import platform
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,7 +19,7 @@ from anysim.record.json import plain
 from anysim.record.manifest import Manifest
 from anysim.record.reader import open_trajectory
 from anysim_export.api import DataSet, Episode, Exporter
-from anysim_processes.jobs import treat_all
+from anysim_processes.executors import share
 
 SYNCING = 16
 """Files that are brought to the disk at a time: what waits together takes one turn of its journal."""
@@ -41,9 +42,17 @@ def made(name: str, options: Mapping[str, Any]) -> tuple[Exporter, dict[str, Any
 
 
 def write_parts(
-    folder: Path, to: str, trajectories: Sequence[Path], data: DataSet, jobs: int, told: Told
+    folder: Path,
+    to: str,
+    trajectories: Sequence[Path],
+    data: DataSet,
+    told: Told,
+    jobs: int | None = None,
+    executor: str | None = None,
 ) -> list[Path]:
     """The folders of all episodes in order; those that are not there are written, in up to `jobs` processes.
+
+    By default that is this one; an executor has workers of its own.
 
     Raises:
         RecordError: a trajectory is damaged.
@@ -51,7 +60,8 @@ def write_parts(
     """
     parts = [folder / f"{i:06d}" for i in range(len(trajectories))]
     work = [(i, trajectories[i], part) for i, part in enumerate(parts) if not part.exists()]
-    for done, i in enumerate(treat_all(work, partial(_writing, folder, to, data), jobs), 1 + len(parts) - len(work)):
+    written = share(executor, work, partial(_writing, folder, to, data), jobs)
+    for done, i in enumerate(written, 1 + len(parts) - len(work)):
         told(f"{trajectories[i].name}: {data.manifests[i].steps} steps", f"{done} of {len(parts)}")
     return parts
 
@@ -68,7 +78,7 @@ def wait_for_writers(folder: Path) -> None:
 def _writing(folder: Path, to: str, data: DataSet) -> Iterator[Callable[[int, Path, Path], int]]:
     """What writes the folder of an episode, with an exporter of this process; as long as it may, it holds a lock."""
     exporter, _ = made(to, data.options)
-    with closing(exporter), _lock(folder.with_name(f"{os.getpid()}.writer")):
+    with closing(exporter), _lock(folder.with_name(f"{platform.node()}-{os.getpid()}.writer")):
         yield partial(_write, exporter, data)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from anysim.cli.options import AsJson, Overrides
+from anysim_processes.options import Executor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +40,11 @@ def render(
     base: Annotated[
         Path | None, typer.Option(help="Folder of the recorded file, where its world has assets with relative paths.")
     ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes that draw.")] = 1,
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", "-j", min=1, help="Processes that draw. [default: 1, or as many as --executor has]"),
+    ] = None,
+    executor: Executor = None,
     annotate: Annotated[
         str | None,
         typer.Option(
@@ -83,16 +88,16 @@ def render(
                 f"{', '.join(told)}: what a job of still images draws stands in {directories[0]}; leave it out, or "
                 "change the file with -o"
             )
-        _stills(directories[0], out, engine, override or (), jobs, quiet=json)
+        _stills(directories[0], out, engine, override or (), jobs, executor, quiet=json)
         return
     order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)
     work = film_targets(find_trajectories(directories), out)
     if annotate is not None:
-        _annotate(work, order, annotate, source, jobs, quiet=json)
+        _annotate(work, order, annotate, source, jobs, executor, quiet=json)
         return
     films: list[Filmed] = []
     with counting("episodes", len(work), quiet=json) as show:
-        for film in film_all(work, order, jobs):
+        for film in film_all(work, order, jobs, executor):
             films.append(film)
             show(_line(film), f"{sum(f.frames for f in films)} images")
     if json:
@@ -116,7 +121,14 @@ def render(
 
 
 def _annotate(
-    work: "Sequence[tuple[Path, Path | None]]", order: "FilmOrder", names: str, source: str, jobs: int, *, quiet: bool
+    work: "Sequence[tuple[Path, Path | None]]",
+    order: "FilmOrder",
+    names: str,
+    source: str,
+    jobs: int | None,
+    executor: str | None,
+    *,
+    quiet: bool,
 ) -> None:
     """Make annotations, which another distribution knows how to."""
     from anysim import registry
@@ -125,7 +137,7 @@ def _annotate(
     make = registry.load("renderings", "annotations")
     done = list[Any]()
     with counting("episodes", len(work), quiet=quiet) as show:
-        for one in make(work, order, names, source, jobs):
+        for one in make(work, order, names, source, jobs, executor):
             done.append(one)
             what = (
                 f"{', '.join(one.made)} -> {one.directory}" if one.made else f"{', '.join(one.present)} there already"
@@ -140,13 +152,20 @@ def _annotate(
 
 
 def _stills(
-    job: Path, out: Path | None, engine: str | None, overrides: "Sequence[str]", jobs: int, *, quiet: bool
+    job: Path,
+    out: Path | None,
+    engine: str | None,
+    overrides: "Sequence[str]",
+    jobs: int | None,
+    executor: str | None,
+    *,
+    quiet: bool,
 ) -> None:
     """Make still images, which another distribution knows how to."""
     from anysim import registry
     from anysim.cli.output import counting, print_json
 
-    steps = registry.load("renderings", "stills")(job, out, engine, overrides, jobs)
+    steps = registry.load("renderings", "stills")(job, out, engine, overrides, jobs, executor)
     last = next(steps)
     with counting("images", last.of - last.done, quiet=quiet or last.done == last.of) as show:
         for last in steps:

@@ -17,7 +17,7 @@ from anysim_film.commit import add_videos, workspace
 from anysim_film.episode import film_episode
 from anysim_film.sheet import FILM_FILE, FilmSheet, read_sheet
 from anysim_film.stage import FilmOrder, Stage, facts_of, refuse_damage, refuse_unknown_cameras
-from anysim_processes.jobs import treat_all
+from anysim_processes.executors import share
 from anysim_schemas.load import LoadedRun
 
 
@@ -173,9 +173,14 @@ def film_targets(trajectories: Sequence[Path], out: Path | None) -> list[tuple[P
     raise RecordError("runs of the same name were given together; film them one by one, each into its own --out")
 
 
-def film_all(work: Sequence[tuple[Path, Path | None]], order: FilmOrder, jobs: int = 1) -> Iterator[Filmed]:
-    """Film trajectories, each into its directory (`Filmer.film`), in up to `jobs` processes; yields each when done."""
-    return treat_all(work, partial(_filming, order), jobs)
+def film_all(
+    work: Sequence[tuple[Path, Path | None]], order: FilmOrder, jobs: int | None = None, executor: str | None = None
+) -> Iterator[Filmed]:
+    """Film trajectories, each into its directory (`Filmer.film`); yields each when done.
+
+    It is done in up to `jobs` processes, by default in this one, or by the workers of an executor.
+    """
+    return share(executor, work, partial(_filming, order), jobs)
 
 
 @contextmanager

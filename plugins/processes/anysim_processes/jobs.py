@@ -4,10 +4,11 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager
-from itertools import islice
+from itertools import chain, islice
 from multiprocessing import get_context
 from typing import Any, TypeVar, TypeVarTuple
 
@@ -22,22 +23,28 @@ Item = TypeVarTuple("Item")
 
 
 def treat_all(
-    work: Sequence[tuple[*Item]], open_: Callable[[], AbstractContextManager[Callable[[*Item], T]]], jobs: int = 1
+    work: Iterable[tuple[*Item]], open_: Callable[[], AbstractContextManager[Callable[[*Item], T]]], jobs: int = 1
 ) -> Iterator[T]:
     """Do something with items in up to `jobs` processes, each of which opens what does it once.
 
     What is complete stays, whatever is raised. With more than one process they come in any order, and a program that
     calls this guards its main module (`if __name__ == "__main__"`), which each process imports. `open_` is pickled.
+
+    Raises:
+        RecordError: a process died; or what an item raised, where it is an error of anysim.
     """
-    if jobs == 1 or len(work) < 2:
+    items = iter(work)
+    first = list(islice(items, jobs))
+    items = chain(first, items)
+    if len(first) < 2:
         with open_() as treat:
-            for item in work:
+            for item in items:
                 yield treat(*item)
         return
     with ProcessPoolExecutor(
-        min(jobs, len(work)), mp_context=get_context("spawn"), initializer=_begin, initargs=(open_, os.getpid())
+        len(first), mp_context=get_context("spawn"), initializer=_begin, initargs=(open_, os.getpid())
     ) as pool:
-        items, begun = iter(work), set[Future[T]]()
+        begun = set[Future[T]]()
         try:
             while True:
                 begun |= {pool.submit(_treated, *item) for item in islice(items, AHEAD * jobs - len(begun))}
@@ -46,6 +53,9 @@ def treat_all(
                 done, begun = wait(begun, return_when=FIRST_COMPLETED)
                 for future in done:
                     yield future.result()
+        except BrokenProcessPool:
+            words = "a worker process died, as where memory runs out; what was complete is there"
+            raise RecordError(f"{words}, and the same command again goes on from it") from None
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise

@@ -23,6 +23,8 @@ from anysim.record.film import camera_of, draw_recorded, film_mode
 from anysim.record.frame import NOTHING, FrameBatch, state_batch
 from anysim.record.header import EpisodeHeader, RunHeader, package_versions, state_layout
 from anysim.record.incoming import claim
+from anysim.record.manifest import read_manifest
+from anysim.record.names import EPISODES, trajectory_name
 from anysim.record.streams import make_sources
 from anysim.record.writer import make_writer
 from anysim.task.contract import Status
@@ -33,8 +35,6 @@ from anysim_recording.trajectory_files import PendingCommit
 
 STATE_FIELDS = ("joint_pos", "joint_vel", "body_pose", "body_twist", "control_position")
 """What is recorded of the state in each step."""
-
-
 RERUNS = 3
 """How often an episode is begun anew whose worker process is lost, before it is given up."""
 
@@ -97,6 +97,15 @@ class EpisodeResult:
         return self.status == Status.SUCCESS
 
 
+def resumed(out: Path, env: int, episode: int) -> EpisodeResult:
+    """How an episode came out whose trajectory is in `out`."""
+    path = out / EPISODES / trajectory_name(env, episode)
+    m = read_manifest(path)
+    outcome = dict(m.outcome)
+    reward = float(outcome.pop("total_reward", 0.0))
+    return EpisodeResult(env, episode, m.episode_seed, m.status, m.steps, reward, outcome, path, resumed=True)
+
+
 def run_header(env: TaskEnv, seed: int) -> RunHeader:
     """What all trajectories of a run of this env have in common."""
     action = list(env.action_spaces.labels)
@@ -127,13 +136,14 @@ class Collector:
         episodes: int,
         seed: int,
         enough: Callable[[], bool] | None = None,
+        wanted: Callable[[int, int], bool] = lambda env, episode: True,
     ) -> None:
-        """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N.
+        """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N, where it is `wanted`.
 
         Once `enough` says so no episode is begun any more; those that are under way are run to their ends.
         """
         self.env, self.policy, self.seed = env, policy, seed
-        self._enough = enough
+        self._enough, self._wanted = enough, wanted
         record, task = env.spec.record, env.spec.task
         assert task is not None
         self._film = film_mode(env.spec)
@@ -166,9 +176,7 @@ class Collector:
         its trajectory is on the disk.
         """
         with closing(self.rounds()) as rounds:
-            for result in rounds:
-                if result is not None:
-                    yield result
+            yield from (result for result in rounds if result is not None)
 
     def rounds(self) -> Generator[EpisodeResult | None]:
         """The same, and None after each control step of the envs: between two of them other work may be done."""
@@ -221,9 +229,12 @@ class Collector:
         for i in map(int, ids[~again]):
             self._episode[i] += 1
             self._reruns[i] = 0
-            while self._episode[i] < self._share[i] and self.recorder.is_committed(i, int(self._episode[i])):
+            while (k := int(self._episode[i])) < self._share[i] and (
+                (there := self.recorder.is_committed(i, k)) or not self._wanted(i, k)
+            ):
                 self.env.streams.skip(i, 1)
-                yield self._resumed(i, int(self._episode[i]))
+                if there:
+                    yield resumed(self.recorder.out, i, k)
                 self._episode[i] += 1
             begin[i] = self._episode[i] < self._share[i] and not (self._enough is not None and self._enough())
         self.env.retire(ids[~begin[ids]])
@@ -264,16 +275,6 @@ class Collector:
             instruction=self._instructions[i],
             cameras={name: camera_of(env, i, name) for name in env.spec.record.cameras},
         )
-
-    def _resumed(self, env: int, episode: int) -> EpisodeResult:
-        from anysim.record.manifest import read_manifest
-        from anysim.record.names import EPISODES, trajectory_name
-
-        path = self.recorder.out / EPISODES / trajectory_name(env, episode)
-        m = read_manifest(path)
-        outcome = dict(m.outcome)
-        reward = float(outcome.pop("total_reward", 0.0))
-        return EpisodeResult(env, episode, m.episode_seed, m.status, m.steps, reward, outcome, path, resumed=True)
 
     def _finish(self, i: int, status: str) -> Iterator[EpisodeResult]:
         """Commit or discard an episode; yields it at once where it is not kept, and not if it is to be run again."""
@@ -353,9 +354,7 @@ class Collector:
         """The images of each of these envs by camera, of those that are due."""
         due = self._capture.due(ids)
         images: dict[int, dict[str, Array]] = {i: {} for i in ids.tolist()}
-        if len(due):
-            for camera in self.env.spec.record.cameras:
-                pictures = self._capture.picture(camera, due)
-                for row, i in enumerate(due.tolist()):
-                    images[i][camera] = pictures[row]
+        for camera in self.env.spec.record.cameras if len(due) else ():
+            for i, picture in zip(due.tolist(), self._capture.picture(camera, due), strict=True):
+                images[i][camera] = picture
         return list(images.values())

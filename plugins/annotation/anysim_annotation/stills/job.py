@@ -13,7 +13,7 @@ from anysim_annotation.stills.labels import coco, kitti_camera, kitti_line
 from anysim_annotation.stills.maker import IMAGES, LABELS, StillsMaker, is_there, loaded_job, numbers_lacking, stem
 from anysim_annotation.stills.spec import StillsSpec
 from anysim_film.stage import refuse_unknown_cameras
-from anysim_processes.jobs import treat_all
+from anysim_processes.executors import share
 from anysim_schemas.load import LoadedRun
 
 JOB_FILE, COCO_FILE = "job.json", "coco.json"
@@ -28,7 +28,12 @@ class Progress(NamedTuple):
 
 
 def render_job(
-    path: Path, out: Path | None = None, engine: str | None = None, overrides: Sequence[str] = (), jobs: int = 1
+    path: Path,
+    out: Path | None = None,
+    engine: str | None = None,
+    overrides: Sequence[str] = (),
+    jobs: int | None = None,
+    executor: str | None = None,
 ) -> Iterator[Progress]:
     """Make the images of a job that are not there yet, and then its files of labels; yields at first, and for each.
 
@@ -37,8 +42,9 @@ def render_job(
         out: the directory; `stills/NAME` if not given.
         engine: in place of the job's.
         overrides: of the job's source, after its own.
-        jobs: processes that share the images; what they write does not depend on it. With more than one, a program
-            guards its main module, which each imports.
+        jobs: processes that share the images, by default one; what they write does not depend on it. With more than
+            one, a program guards its main module, which each imports.
+        executor: whose workers do it in place of such processes; in place of the job's.
 
     Raises:
         SpecError: the job or its world is wrong, with the place.
@@ -56,7 +62,7 @@ def render_job(
         if lock is None:
             raise RecordError(f"another process makes the images in {where}; wait for it, or choose another --out")
         with lock:
-            yield from _work(job, path.parent, where, jobs)
+            yield from _work(job, path.parent, where, jobs, executor or job.executor)
     except OSError as error:
         raise RecordError(
             f"cannot write into {where}: {error.strerror or error} ({error.filename or where}). Images that were "
@@ -64,11 +70,11 @@ def render_job(
         ) from error
 
 
-def _work(job: StillsSpec, folder: Path, where: Path, jobs: int) -> Iterator[Progress]:
+def _work(job: StillsSpec, folder: Path, where: Path, jobs: int | None, executor: str | None) -> Iterator[Progress]:
     loaded = loaded_job(job, folder)
     cameras = _cameras(job, loaded)
     scenes = -(-job.images // len(cameras))
-    asked = job.model_dump(mode="json", exclude={"batch"})
+    asked = job.model_dump(mode="json", exclude={"batch", "executor"})
     sheet = {"format": "anysim-stills-1", "job": asked, "spec": plain(loaded.spec.to_dict()), "cameras": cameras}
     if (where / JOB_FILE).exists():
         if load_json(where / JOB_FILE) != plain(sheet):
@@ -79,9 +85,11 @@ def _work(job: StillsSpec, folder: Path, where: Path, jobs: int) -> Iterator[Pro
     lacking = [s for s in range(scenes) if numbers_lacking(job, cameras, s, where)]
     there, new = _count(job, where), 0
     yield Progress(there, job.images, new)
-    rows = min(job.batch, -(-len(lacking) // jobs))
+    rows = min(job.batch, -(-len(lacking) // (jobs or 1)))
     parts = [(tuple(lacking[begin : begin + rows]),) for begin in range(0, len(lacking), rows or 1)]
-    for made in treat_all(parts, partial(StillsMaker, job, folder, cameras, rows, where), jobs):
+    for made in share(
+        executor, parts, partial(StillsMaker, job, folder.absolute(), cameras, rows, where.absolute()), jobs
+    ):
         for _ in range(made):
             new += 1
             yield Progress(there + new, job.images, new)

@@ -31,3 +31,4 @@ class StillsSpec(Spec):
     batch: Annotated[int, Field(ge=1, le=1024)] = Field(
         default=4, description="resets at once; results do not depend on it"
     )
+    executor: str | None = Field(default=None, description="whose workers make them; results do not depend on it")

@@ -9,12 +9,14 @@ import typer
 
 from anysim.cli.options import BROKE, AsJson, Engine, NumEnvs, Overrides, Robot, Seed, Verbose, with_robot
 from anysim_collect.mixture import Balance
+from anysim_processes.options import PROCESSES, Executor, Workers
 
 if TYPE_CHECKING:
     from anysim.task.env import TaskEnv
     from anysim_collect.endings import Ran
     from anysim_collect.mixture import Limits, Part
     from anysim_collect.turns import Collection
+    from anysim_recording.collector import EpisodeResult
 
 Tasks = Annotated[
     list[str],
@@ -67,6 +69,8 @@ def run(
     view: Annotated[
         bool, typer.Option("--view", help="Show the envs in a browser while they run; the address is printed.")
     ] = False,
+    executor: Executor = None,
+    workers: Workers = None,
     verbose: Verbose = False,
     json: AsJson = False,
 ) -> None:
@@ -82,6 +86,7 @@ def run(
       anysim run pick_cube -o world.objects.cube.mass=0.3 --out runs/heavy
       anysim run pick_cube=3 push_cube=1 --num-envs 16 --hours 2 --bytes 20GB --out runs/mixed
       anysim run pick_cube put_away --balance segments --num-envs 16 --episodes 64 --out runs/mixed
+      anysim run pick_cube --num-envs 4 --episodes 64 --executor ray
     """
     from anysim.record.commit import file_at, no_directory
     from anysim_collect.balance import balanced
@@ -101,18 +106,24 @@ def run(
     limits = Limits(hours, None if max_bytes is None else parse_bytes(max_bytes))
     bounded = hours is not None or max_bytes is not None
     total = episodes if episodes is not None else UNBOUNDED if bounded else 1
-    with ExitStack() as stack:
-        collections: list[Collection] = []
-        for part, count in zip(parts, shared_out(parts, total), strict=True):
-            if count == 0:
-                continue
-            order = Order(part, engine, num_envs, seed, overrides, strict_observers, view, verbose, json)
-            own = out if out is None or len(parts) == 1 else out / Path(part.task).stem
-            ends = bounded and episodes is None
-            collections.append(_begin(stack, order, own, count, None if ends else count, limits))
-        with showing(collections, json) as show:
-            collect(collections, show)
-        runs = _end(collections, balance)
+    ordered = [
+        (
+            Order(part, engine, num_envs, seed, overrides, strict_observers, view, verbose, json),
+            out if out is None or len(parts) == 1 else out / Path(part.task).stem,
+            count,
+            None if bounded and episodes is None else count,
+        )
+        for part, count in zip(parts, shared_out(parts, total), strict=True)
+        if count > 0
+    ]
+    if executor is not None or workers is not None:
+        runs = _run_shared(ordered, limits, balance, executor or PROCESSES, workers)
+    else:
+        with ExitStack() as stack:
+            collections = [_begin(stack, *one, limits) for one in ordered]
+            with showing(collections, json) as show:
+                collect(collections, show)
+            runs = _end(collections, balance)
     if json:
         _print_json(runs)
     else:
@@ -200,6 +211,49 @@ def _begin(
         present = len(made.collector.recorder.committed())
         _announce(env, directory, total, seed, present, order.verbose, task)
     return made
+
+
+def _run_shared(
+    ordered: "Sequence[tuple[Order, Path | None, int, int | None]]",
+    limits: "Limits",
+    balance: Balance,
+    executor: str,
+    workers: int | None,
+) -> "list[Ran]":
+    """Have the tasks collected by the workers of an executor."""
+    from anysim.cli.output import counting
+    from anysim.errors import TaskError
+    from anysim_collect.live import line
+    from anysim_collect.sharing import SharedCollection, collect_shared, ended, shared_job
+
+    with ExitStack() as stack:
+        collections: list[SharedCollection] = []
+        for order, out, episodes, total in ordered:
+            if order.view:
+                raise TaskError("--view shows envs of this process, and --executor has them elsewhere; leave one out")
+            task, share = order.part
+            job, own = shared_job(task, order.engine, order.num_envs, order.seed, order.overrides)
+            job = job._replace(episodes=episodes, strict_observers=order.strict_observers)
+            one = SharedCollection(job, out or own, share, total)
+            stack.callback(one.keeper.close)
+            collections.append(one)
+            if not order.json:
+                count = "episodes" if total is None else f"{total} episodes"
+                typer.echo(
+                    f"{task} on {job.engine}: {count} in rounds of {job.num_envs}, seed {job.seed}, by {executor}"
+                )
+                there = f" (resuming: {len(one.there)} are there already)" if one.there else ""
+                typer.echo(f"trajectories: {one.out}{there}")
+        quiet, several = ordered[0][0].json, len(ordered) > 1
+        left = sum(one.job.episodes if one.total is None else one.total for one in collections)
+        with counting("episodes", left - sum(len(one.there) for one in collections), quiet) as show:
+
+            def tell(task: str, result: "EpisodeResult") -> None:
+                won, tried = (sum(getattr(c.tally, of) for c in collections) for of in ("successes", "attempts"))
+                show(f"{task}: {line(result)}" if several else line(result), f"{won} of {tried} succeeded")
+
+            wall = collect_shared(collections, limits, executor, workers, tell)
+        return ended(collections, balance, wall, limits.reached())
 
 
 def _end(collections: "Sequence[Collection]", balance: Balance) -> "list[Ran]":

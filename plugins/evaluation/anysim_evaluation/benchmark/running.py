@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +24,8 @@ from anysim_evaluation.benchmark.results import Cell
 from anysim_evaluation.driver import Episode, drive
 from anysim_evaluation.log import FILE, EpisodeLog, identity, read_log
 from anysim_evaluation.policy import make_policy
+from anysim_evaluation.sharing import Answer, Answerer, Question, portions
+from anysim_processes.executors import share
 
 WATCH_S = 0.2
 """How often a worker looks whether its parent is there, and a parent what its workers have done [s]."""
@@ -108,12 +111,20 @@ def absences(protocol: Protocol, out: Path) -> Iterator[dict[str, str]]:
 
 
 def run(
-    protocol: Protocol, parts: Mapping[str, str], out: Path, *, only: str = "", workers: int = 1, tell: Tell
+    protocol: Protocol,
+    parts: Mapping[str, str],
+    out: Path,
+    *,
+    only: str = "",
+    workers: int | None = None,
+    executor: str | None = None,
+    tell: Tell,
 ) -> None:
     """Run what is left. Each episode is on the disk once it has ended, whatever becomes of this process.
 
     Results depend neither on the number of workers nor on how often it was cut off. `tell` is called with a line for
-    each episode. With more than one worker the main module of a program that calls this is guarded.
+    each episode. With more than one worker the main module of a program that calls this is guarded. With an `executor`
+    its workers run the episodes, and this process writes them down.
 
     Raises:
         RecordError: the directory has other episodes, or another process runs there.
@@ -129,11 +140,13 @@ def run(
                 left.setdefault((cell.task, cell.engine), []).append(cell.policy)
         work = [Job(protocol, parts, out, task, engine, policies) for (task, engine), policies in left.items()]
         work.sort(key=lambda job: -len(job.policies) * int(parts[f"tasks.{job.task}.horizon"].split()[0]))
-        if workers == 1 or len(work) < 2:
+        if executor is not None:
+            _share_out(work, there, executor, workers, tell)
+        elif workers in (None, 1) or len(work) < 2:
             for job in work:
                 run_job(job, tell)
         else:
-            _share(work, out, min(workers, len(work)), tell)
+            _share(work, out, min(workers or 1, len(work)), tell)
             _wait_for_orphans(out)
 
 
@@ -193,6 +206,72 @@ def _absent(job: Job, cell: Cell, error: AnysimError, tell: Tell) -> None:
     where.mkdir(parents=True, exist_ok=True)
     write_whole(where, {ABSENT: json.dumps({"why": str(error)}) + "\n"})
     tell(f"{'/'.join(cell)} cannot be run: {error}")
+
+
+# ------------------------------------------------------------------ workers of an executor
+
+
+class _Part(NamedTuple):
+    """Some seeds of a cell; `question` is what is asked of its policy."""
+
+    cell: Cell
+    question: Question
+    seeds: tuple[int, ...]
+
+
+def _share_out(
+    work: Sequence[Job], there: Mapping[Cell, Mapping[int, Episode]], executor: str, workers: int | None, tell: Tell
+) -> None:
+    """Have the episodes run by an executor's workers; what an episode cost is its share of what it was run with."""
+    jobs = {(job.task, job.engine): job for job in work}
+    items = [(part,) for job in work for part in _parts(job, there)]
+    for part, answer, cpu_s in share(executor, items, _answering, workers):
+        job = jobs[part.cell.task, part.cell.engine]
+        if isinstance(answer, AnysimError):
+            _absent(job, part.cell, answer, tell)
+            continue
+        where = folder(job.out, part.cell)
+        (where / ABSENT).unlink(missing_ok=True)
+        with EpisodeLog(where, answer.what | {"frozen": of_cell(job.parts, *part.cell)}) as log:
+            for episode in answer.episodes:
+                log.add(episode)
+                _charge(where / COST, episode.seed, cpu_s / len(answer.episodes))
+                tell(f"{'/'.join(part.cell)} seed {episode.seed}: {episode.failure or 'success'}")
+
+
+def _parts(job: Job, there: Mapping[Cell, Mapping[int, Episode]]) -> Iterator[_Part]:
+    spec = job.protocol.spec
+    engine, task = spec.engines[job.engine], spec.tasks[job.task]
+    num_envs = min(spec.num_envs, spec.seeds.episodes)
+    for name in job.policies:
+        cell, policy = Cell(job.task, job.engine, name), spec.policies[name]
+        question = Question(
+            job.protocol.source(job.task),
+            {"name": engine.engine, "options": engine.options},
+            num_envs,
+            tuple(overrides(task)),
+            policy.policy,
+            policy.privileged,
+            None if spec.modality is None else tuple(spec.modality),
+        )
+        left = [seed for seed in job.protocol.seeds() if seed not in there[cell]]
+        for seeds in portions(left, num_envs):
+            yield _Part(cell, question, seeds)
+
+
+@contextmanager
+def _answering() -> Iterator[Callable[[_Part], tuple[_Part, Answer | AnysimError, float]]]:
+    with closing(Answerer()) as answerer:
+
+        def answer(part: _Part) -> tuple[_Part, Answer | AnysimError, float]:
+            began = time.process_time()
+            try:
+                answerer.prepare(part.question)
+            except (CapabilityError, TaskError) as error:
+                return part, TaskError(str(error)), 0.0
+            return part, answerer.answer(part.question, part.seeds), time.process_time() - began
+
+        yield answer
 
 
 # ------------------------------------------------------------------ worker processes

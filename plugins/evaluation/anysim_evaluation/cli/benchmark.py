@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from anysim.cli.options import AsJson
+from anysim_processes.options import Executor
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -82,8 +83,15 @@ def freeze(protocol: Name) -> None:
 def run(
     protocol: Name,
     workers: Annotated[
-        int, typer.Option("--workers", "-w", min=1, help="Worker processes; results do not depend on it.")
-    ] = 1,
+        int | None,
+        typer.Option(
+            "--workers",
+            "-w",
+            min=1,
+            help="Worker processes, or workers of --executor at most; results do not depend on it. [default: 1]",
+        ),
+    ] = None,
+    executor: Executor = None,
     out: Annotated[Path | None, typer.Option(help="Directory of the results; default runs/benchmark-NAME.")] = None,
     only: Annotated[
         str, typer.Option(metavar="TASK/ENGINE/POLICY", help="Run these alone now; `*` stands for all of a kind.")
@@ -105,6 +113,7 @@ def run(
     Examples:
       anysim benchmark run core12 --workers 2
       anysim benchmark run core12 --only reach/mujoco --out runs/try
+      anysim benchmark run core12 --executor ray
       anysim benchmark run core12 --policy mine=my_policies:act
     """
     from anysim.cli.output import counting, print_json
@@ -125,7 +134,7 @@ def run(
     chosen = running.cells(loaded, only)
     total = len(loaded.seeds()) * len(chosen) - sum(len(there[cell]) for cell in chosen)
     with counting(loaded.spec.name, total, json) as tell:
-        running.run(loaded, parts, folder, only=only, workers=workers, tell=tell)
+        running.run(loaded, parts, folder, only=only, workers=workers, executor=executor, tell=tell)
     told = write_results(loaded, parts, changed, folder)
     if json:
         print_json(told)

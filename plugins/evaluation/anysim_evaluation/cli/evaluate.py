@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -9,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from anysim.cli.options import AsJson, Overrides, Robot, Task, with_robot
+from anysim_processes.options import PROCESSES, Executor, Workers
 
 if TYPE_CHECKING:
     from anysim_evaluation.driver import Episode
 
 PAGE = "evaluation.html"
-MOST_ENVS = 16
+MOST_ENVS, ENVS_OF_A_WORKER = 16, 4
 """Envs where their number is not given; it changes the time alone."""
 
 
@@ -28,6 +30,8 @@ class Question(NamedTuple):
     overrides: Sequence[str]
     num_envs: int
     privileged: bool
+    executor: str | None = None
+    workers: int | None = None
 
 
 def evaluate(
@@ -64,6 +68,8 @@ def evaluate(
     ] = 0,
     override: Overrides = None,
     out: Annotated[Path | None, typer.Option(help="Directory of the results; default runs/evaluate-….")] = None,
+    executor: Executor = None,
+    workers: Workers = None,
     json: AsJson = False,
 ) -> None:
     """Say how often a policy solves a task, on one engine or on all, from the same episode seeds.
@@ -82,6 +88,7 @@ def evaluate(
       anysim evaluate pick_cube --policy expert:sigma=0.1 --level L2
       anysim evaluate stack_cube --robot ur5_gripper
       anysim evaluate reach --policy my_policies:reach --split test
+      anysim evaluate pick_cube --episodes 200 --executor ray
       anysim evaluate maniskill:PickCube-v1 --policy my_policies:pick
     """
     from anysim.cli.output import print_json
@@ -94,18 +101,21 @@ def evaluate(
 
     overrides = [*with_robot(override, robot), *([] if level is None else [f"level={level}"])]
     seeds = episode_seeds(split, first, episodes)
-    question = Question(task, policy, split, seeds, overrides, min(num_envs or MOST_ENVS, episodes), privileged)
+    shared = executor or (None if workers is None else PROCESSES)
+    envs = min(num_envs or (MOST_ENVS if shared is None else ENVS_OF_A_WORKER), episodes)
+    question = Question(task, policy, split, seeds, overrides, envs, privileged, shared, workers)
     said = [Path(task).stem, policy, *([level] if level else []), *([robot] if robot else []), split]
     folder = out or Path("runs") / "-".join(["evaluate", *map(_plain, said)])
     done: dict[str, dict[int, Episode]] = {}
     films: dict[str, list[str]] = {}
     if is_external(task):
         given = {"--engine": engine, "--level": level, "--robot": robot, "--override": override, "--num-envs": num_envs}
-        _refuse_for_external(task, {**given, "--privileged": privileged, "--videos": videos})
+        given |= {"--privileged": privileged, "--videos": videos, "--executor": executor, "--workers": workers}
+        _refuse_for_external(task, given)
         done = _evaluate_external(question, folder, json)
     for name in [] if done else _engines(engine):
         try:
-            found = _evaluate(question, name, folder, json)
+            found = (_evaluate if shared is None else _evaluate_shared)(question, name, folder, json)
             done |= found
             films |= _filmed(question, found, videos, folder) if videos else {}
         except AnysimError as error:
@@ -161,6 +171,37 @@ def _evaluate(question: Question, engine: str | None, folder: Path, quiet: bool)
             return drive(env, driven, seeds, privileged=question.privileged)
 
         return {env.engine.name: _logged(question, env.engine.name, folder, what, run, quiet)}
+
+
+def _evaluate_shared(
+    question: Question, engine: str | None, folder: Path, quiet: bool
+) -> "dict[str, dict[int, Episode]]":
+    """The same, from the workers of an executor; each of them has `num_envs` envs, and as many seeds at a time."""
+    from anysim.api import load
+    from anysim.cli.output import counting
+    from anysim_evaluation import sharing
+    from anysim_evaluation.log import FILE, EpisodeLog, read_log
+    from anysim_processes.executors import share
+
+    overrides = (*question.overrides, "record.cameras=[]")
+    name = engine or load(question.task, overrides=overrides).spec.engine.name
+    there = read_log(folder / name / FILE).episodes
+    left = [seed for seed in question.seeds if seed not in there]
+    asked = sharing.Question(question.task, name, question.num_envs, overrides, question.policy, question.privileged)
+    work = [(asked, seeds) for seeds in sharing.portions(left, question.num_envs)]
+    won = sum(there[seed].status == "success" for seed in question.seeds if seed in there)
+    with ExitStack() as stack:
+        tell = stack.enter_context(counting(f"{question.policy} on {question.task}, {name}", len(left), quiet))
+        log: EpisodeLog | None = None
+        for answer in share(question.executor, work, sharing.answering, question.workers):
+            if log is None:
+                log = stack.enter_context(EpisodeLog(folder / name, answer.what))
+            for episode in answer.episodes:
+                log.add(episode)
+                won += episode.status == "success"
+                tell(f"{name} seed {episode.seed}: {episode.failure or 'success'}", f"{won} solved")
+        assert log is not None, "there is always a portion"
+        return {name: {seed: log.episodes[seed] for seed in question.seeds}}
 
 
 def _logged(
