@@ -9,7 +9,7 @@ import tarfile
 import tempfile
 from pathlib import Path
 
-from hatchling.build import build_sdist, build_wheel
+from hatchling.build import build_sdist, build_wheel  # pyright: ignore[reportMissingImports] of the wheels' environment
 
 
 def build(member: Path, out: Path) -> None:

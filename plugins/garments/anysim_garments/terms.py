@@ -32,7 +32,7 @@ class Points:
 
 
 @at_most(1.0)
-class Covered:
+class CoveredShare:
     """Share of its flat area that a garment covers, seen from above."""
 
     def __init__(self, scene: SceneView, *, category: CategoryView) -> None:
@@ -42,7 +42,7 @@ class Covered:
         return np.minimum(covered(self._cloth.state().points, self._cloth.faces) / self._cloth.area, 1.0)
 
 
-class SpreadOut(Covered):
+class SpreadOut(CoveredShare):
     """A garment covers such a share of its flat area, seen from above."""
 
     def __init__(
@@ -85,7 +85,7 @@ class PairsNear(Gap):
         return 1.0 - np.tanh(self.gaps().mean(axis=1) / self._scale)
 
 
-class Folded(Gap):
+class FoldedPairs(Gap):
     """Pairs of points of a garment lie together, and it lies low: its highest point is not far above its lowest."""
 
     def __init__(
@@ -176,6 +176,6 @@ class Below:
 
 TERMS = {
     "observation": {"points": Points},
-    "reward": {"covered": Covered, "middle_near": MiddleNear, "pairs_near": PairsNear, "point_near": PointNear},
-    "predicate": {"below": Below, "folded": Folded, "hung": Hung, "let_go": LetGo, "spread_out": SpreadOut},
+    "reward": {"covered": CoveredShare, "middle_near": MiddleNear, "pairs_near": PairsNear, "point_near": PointNear},
+    "predicate": {"below": Below, "folded": FoldedPairs, "hung": Hung, "let_go": LetGo, "spread_out": SpreadOut},
 }

@@ -107,7 +107,7 @@ def differences(one: ImportedModel, other: ImportedModel, *, velocities: bool = 
     rng = np.random.default_rng(0)
     ends = [(max(j.lower, -3.0), min(j.upper, 3.0)) for j in one.joints]
     frames = 0.0
-    for at in (np.zeros(len(ends)), np.array([rng.uniform(*sorted(pair)) for pair in ends])):
+    for at in (np.zeros(len(ends)), np.array([rng.uniform(min(pair), max(pair)) for pair in ends])):
         before, after = poses(one, at), poses(other, at)
         before["world (body)"] = before.pop("world", before[one.bodies[0].name])  # as MJCF has to call it
         after.setdefault("world (body)", after.get("world", after[other.bodies[0].name]))
