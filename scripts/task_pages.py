@@ -10,7 +10,7 @@ import sys
 
 from benchmark_table import table
 from generated import drift
-from task_gallery import ENGINES, Figures, stored, tasks
+from task_gallery import ENGINES, Figures, solver, stored, tasks
 
 from anysim.api import check_engine, compile_world, load, task_path
 from anysim.engine.factory import engine_class
@@ -19,16 +19,18 @@ from anysim.model.world import World
 from anysim_schemas.load import LoadedRun
 
 NAME, SCRIPT = "engines", "task_pages.py"
+WHO = {"expert": "the expert", "shipped": "the policy that comes with it"}
 TITLES = {"mujoco": "MuJoCo", "pybullet": "PyBullet", "sapien": "SAPIEN"}
 
 
 def section(name: str, figures: Figures) -> str:
     """A table of the engines, and where the rest is said."""
+    loaded = load(name)
+    by = solver(loaded.spec) or "expert"
     rows = [
         [f"solved by {who}", *(_rate(figures.get(policy, {}).get(engine)) for engine in ENGINES)]
-        for policy, who in (("expert", "the expert"), ("random", "a random policy"))
+        for policy, who in ((by, WHO[by]), ("random", "a random policy"))
     ]
-    loaded = load(name)
     world = compile_world(loaded)
     rows.append(["approximately", *(_limits(loaded, world, engine) for engine in ENGINES)])
     words = f"`anysim check {name} --all-engines -v` says by how much an engine is off in what it does approximately."
