@@ -36,7 +36,8 @@ def test_the_null_engine_passes(tmp_path):
     passed, skipped, why = _summary(_run(tmp_path, "--engine", "null"))
     assert passed > 215
     counts = dict(part.rsplit(": ", 1) for part in why.split(", "))
-    assert set(counts) == {"dynamics", "external wrenches", "raycast", "render: rgb"}
+    couplings = {"connects", "fixed tendons: drives", "mimic joints: curves", "welds"}
+    assert set(counts) == {"dynamics", "external wrenches", "raycast", "render: rgb", *couplings}
     assert sum(map(int, counts.values())) == skipped
 
 

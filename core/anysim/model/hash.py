@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.model.parts import Mimic
 from anysim.model.world import Mesh, Quat, Texture, Vec3, World
 
 FORMAT = "anysim-world-1"
@@ -36,6 +37,8 @@ def _feed(digest: Any, value: Any) -> None:
             digest.update(f"|{field.name}=".encode())
             _feed(digest, getattr(value, field.name))
         digest.update(b">")
+    elif isinstance(value, Mimic) and not value.curve:  # as before there were curves
+        _feed(digest, value[:3])
     elif isinstance(value, bool) or value is None or isinstance(value, int | str):
         digest.update(f"{type(value).__name__}:{value};".encode())
     elif isinstance(value, float):

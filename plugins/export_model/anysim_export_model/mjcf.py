@@ -125,7 +125,7 @@ class _Mjcf:
         for joint in model.joints:
             if joint.mimic is not None:
                 leader = full(model.joints[joint.mimic.joint].name)
-                line = numbers((joint.mimic.offset, joint.mimic.multiplier, 0.0, 0.0, 0.0))
+                line = numbers((joint.mimic.offset, joint.mimic.multiplier, *(*joint.mimic.curve, 0.0, 0.0, 0.0)[:3]))
                 sub(self.equality, "joint", joint1=full(joint.name), joint2=leader, polycoef=line)
         for low, high in sorted(model.excluded_pairs):
             self._exclude(full(model.bodies[low].name), full(model.bodies[high].name))

@@ -176,6 +176,8 @@ class _Urdf:
             leader = self.model.joints[joint.mimic.joint].name
             ratio, offset = number(joint.mimic.multiplier), number(joint.mimic.offset)
             sub(element, "mimic", joint=leader, multiplier=ratio, offset=offset)
+            if joint.mimic.curve:
+                notes.lost("curve of a mimic", "is left out: it follows in proportion", joint.name)
         if joint.stiffness:
             spring = sub(self.root, "gazebo", reference=joint.name)
             sub(spring, "springStiffness").text = number(joint.stiffness)

@@ -119,7 +119,7 @@ def differences(one: ImportedModel, other: ImportedModel, *, velocities: bool = 
         for key in keys
     ]
     mimics = [
-        difference([0, *a.mimic] if a.mimic else [1], [0, *b.mimic] if b.mimic else [1])
+        difference([0, *a.mimic[:3]] if a.mimic else [1], [0, *b.mimic[:3]] if b.mimic else [1])
         for a, b in zip(one.joints, other.joints, strict=True)
     ]
     return {

@@ -66,7 +66,7 @@ def test_frames_joints_and_shapes(tmp_path: Path) -> None:
     assert (shoulder.damping, shoulder.friction, shoulder.stiffness, shoulder.spring_rest) == (0.3, 0.1, 4.0, 0.2)
     assert frame(model, "lower")[:3] == pytest.approx([0.1, 0.2, 1.5])
     assert elbow.axis == pytest.approx((-1.0, 0.0, 0.0))  # up, seen from a link that is turned about y
-    assert elbow.mimic == (0, 2.0, -1.0)
+    assert elbow.mimic == (0, 2.0, -1.0, ())
     collision, visual = (next(g for g in model.geoms if g.collides is on) for on in (True, False))
     assert collision.shape == Capsule(0.1, 0.2)
     assert collision.position == pytest.approx((-0.1, -0.2, 0.0))
