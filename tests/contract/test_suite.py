@@ -75,8 +75,8 @@ def test_the_articulated_example_passes(words):
 
 DYNAMIC = {
     "mujoco": {"render: rgb", "solver settings by entity", "terrain: triangle mesh (concave)"},
-    "pybullet": {"render: rgb", "solver settings by entity", "parameter world.shadows"},
-    "sapien": {"render: rgb", "render: shadows", "parameter world.shadows"},
+    "pybullet": {"render: rgb", "fixed tendons: drives", "solver settings by entity", "parameter world.shadows"},
+    "sapien": {"render: rgb", "fixed tendons: drives", "render: shadows", "parameter world.shadows"},
 }
 """The engines of the repository that move things, and for want of what a test of theirs may be skipped."""
 

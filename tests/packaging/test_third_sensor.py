@@ -40,7 +40,7 @@ def test_its_wheel_brings_a_sensor_that_is_read_recorded_and_replayed(
     environment, program, external_wheels, tmp_path
 ) -> None:
     wheel = external_wheels["anysim-barometer"]
-    members = ("anysim", "anysim-mujoco", "anysim-sensors", "anysim-mcap", "anysim-inspect")
+    members = ("anysim", "anysim-mujoco", "anysim-sensors", "anysim-mcap", "anysim-inspect", "anysim-recording")
     python = environment(*members, others=(wheel,))
     anysim = python.with_name("anysim")
     rows = {row["name"]: row for row in json.loads(program(anysim, "list", "sensors", "--json", cwd=tmp_path).stdout)}

@@ -95,8 +95,8 @@ def test_a_strip_that_sticks_out_sinks_by_its_weight_over_its_rigidity():
 @EACH
 def test_a_hand_that_closes_holds_cloth_feels_its_weight_and_is_remembered(engine):
     """Nothing is lost between hand and cloth; a snapshot goes on with the same points; it falls when the hand opens."""
-    require_engine(engine)
-    with begun(held(engine), num_envs=2) as (env, it):
+    require_engine(engine)  # `closed` is wide: cloth falls while fingers close, which takes longer on some engines
+    with begun(held(engine, closed=0.025), num_envs=2) as (env, it):
         go(env, CLOSE, 40)
         one = hand_of(env, 1)
         assert one["stage"] == "holding"
@@ -121,7 +121,7 @@ def test_a_hand_that_closes_holds_cloth_feels_its_weight_and_is_remembered(engin
         assert np.array_equal(it.x, expected)
         assert env.families.state("it").fields["held"].sum() == sum(len(hand_of(env, i)["points"]) for i in (0, 1))
         before = it.x[..., 2].max()
-        go(env, OPEN, 15)
+        go(env, OPEN, 60)
         assert not env.families.state("it").fields["held"].any()
         assert it.x[..., 2].max() < before - 0.1
 
