@@ -73,7 +73,7 @@ def test_the_articulated_example_passes(words):
     assert skipped > 400
 
 
-COUPLED = ("fixed tendons: ", "mimic joints: curves")
+COUPLED = ("fixed tendons: ", "dry friction and armature", "mimic joints: curves")
 """What MuJoCo alone has, one of a test's needs or several."""
 DYNAMIC = {
     "mujoco": {"render: rgb", "solver settings by entity", "terrain: triangle mesh (concave)"},
