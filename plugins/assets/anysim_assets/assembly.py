@@ -204,25 +204,25 @@ def ring(
 
     They meet at their inner edges: what they overlap by outside counts once, by the mean width of a sector.
     """
+    for i, (wide, place, turn, sector) in enumerate(ring_boards(radii, height, pieces), 1):
+        body.solid(link, f"{name}_{i}", wide, place, density, color, turn, filled=sector)
+
+
+def ring_boards(radii: tuple[float, float], height: float, pieces: int) -> Iterator[tuple[Box, Vec3, Quat, Box]]:
+    """Boards of `ring` with their places and turns, and what of each counts."""
     inner, outer = radii
     wall, middle = outer - inner, (inner + outer) / 2
     wide = Box((wall / 2, outer * tan(pi / pieces), height / 2))
     sector = Box((wall / 2, middle * tan(pi / pieces), height / 2))
     for i in range(pieces):
         angle = 2 * pi * i / pieces
-        place = (middle * cos(angle), middle * sin(angle), height / 2)
-        turn = turned((0.0, 0.0, 1.0), angle)
-        body.solid(link, f"{name}_{i + 1}", wide, place, density, color, turn, filled=sector)
+        yield wide, (middle * cos(angle), middle * sin(angle), height / 2), turned((0.0, 0.0, 1.0), angle), sector
 
 
 def flared_boards(foot: float, rim: float, height: float, wall: float, pieces: int) -> Iterator[tuple[Box, Vec3, Quat]]:
-    """The wall of a vessel [m] about z, from the edge of its floor, which is `wall` thick, to its rim.
-
-    Boards with their places and turns; radii are inside, and outside the boards' corners are beyond their middles.
-    """
+    """The wall of a vessel [m] about z, from the edge of its floor, `wall` thick, to its rim: boards, radii inside."""
     out, up = rim - foot, height - wall
     lean = atan2(out, up)
-    # the inner side goes from the edge of the floor to the rim
     middle = ((rim + foot) / 2 + wall / 2 * cos(lean), (height + wall) / 2 - wall / 2 * sin(lean))
     board = Box((wall / 2, max(rim, foot) * tan(pi / pieces), hypot(out, up) / 2))
     leaning = P.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(lean))

@@ -10,7 +10,6 @@ where `my_things/pack.py` has `__getattr__ = pack(Path(__file__).parent / "objec
 
 from collections.abc import Callable, Iterator
 from functools import cache
-from math import pi
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,11 +17,13 @@ import numpy as np
 
 from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
+from anysim.errors import SpecError, SpecIssue
 from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.affordances import Affordance
-from anysim.model.world import Box, Capsule, Cylinder, JointType, Quat, Shape, Sphere, Vec3
-from anysim_assets.assembly import Assembly, flared_boards
+from anysim.model.hash import split, tidy
+from anysim.model.world import Box, Capsule, Cylinder, JointType, Shape, Sphere, Vec3
+from anysim_assets.assembly import Assembly, flared_boards, ring_boards
 from anysim_household.spec import MaterialSpec, PackSpec, PieceSpec, ThingSpec
 from anysim_schemas.base import Color
 from anysim_schemas.errors import KeyFault
@@ -78,7 +79,8 @@ def things(folder: Path) -> dict[str, tuple[ThingSpec, dict[str, MaterialSpec]]]
     for file in sorted(folder.glob("*.yaml")):
         said = load(PackSpec, file).spec
         if double := found.keys() & said.things.keys():
-            raise ValueError(f"{file}: another file of the pack has {', '.join(sorted(double))} already")
+            words = f"another file of the pack has {', '.join(sorted(double))} already"
+            raise SpecError([SpecIssue(str(file), "things", words)])
         found |= {name: (thing, MATERIALS | said.materials) for name, thing in said.things.items()}
     return found
 
@@ -125,19 +127,21 @@ def built(name: str, thing: ThingSpec, materials: dict[str, MaterialSpec], color
         for number, solid in enumerate(made[key], 1):
             label = key if len(made[key]) == 1 else f"{key}_{number}"
             geoms.setdefault(key, []).append(f"{piece.link}.{label}")
+            at = np.array(piece.at) + P.rotate(turn, solid.at) - origins[piece.link]
+            place, direction = split(np.array([*at, *P.multiply(turn, solid.turn)]))
             body.solid(
                 numbers[piece.link],
                 label,
                 solid.shape,
-                _vec(np.array(piece.at) + P.rotate(turn, solid.at) - origins[piece.link]),
+                place,
                 share * _density(key, thing, materials),
                 shown,
-                _quat(P.multiply(turn, solid.turn)),
+                direction,
                 filled=solid.filled,
                 alpha=piece.alpha,
             )
     for key, frame in thing.frames.items():
-        body.site(numbers[frame.link], key, _vec(np.array(frame.at) - origins[frame.link]))
+        body.site(numbers[frame.link], key, tidy(np.array(frame.at) - origins[frame.link]))
     for key, afford in thing.affords.items():
         names = tuple(geom for piece in afford.pieces for geom in geoms[piece])
         joint = thing.frames[afford.at].link
@@ -157,7 +161,7 @@ def solids(name: str, piece: PieceSpec) -> Iterator[Solid]:
     """
     none = np.zeros(3)
     if piece.box is not None:
-        yield _whole(Box(_vec(np.array(piece.box) / 2)), none)
+        yield _whole(Box(tidy(np.array(piece.box) / 2)), none)
     elif piece.sphere is not None:
         yield _whole(Sphere(piece.sphere), none)
     elif piece.cylinder is not None:
@@ -186,12 +190,8 @@ def solids(name: str, piece: PieceSpec) -> Iterator[Solid]:
         said = piece.ring
         if said.inner >= said.outer:
             raise KeyFault(f"the ring '{name}' has a hole of {said.inner:g} m in a radius of {said.outer:g} m", name)
-        middle, half = (said.inner + said.outer) / 2, np.tan(pi / said.boards)
-        board = Box(((said.outer - said.inner) / 2, float(said.outer * half), said.height / 2))
-        for i in range(said.boards):
-            turn = P.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(2 * pi * i / said.boards))
-            place = P.rotate(turn, np.array([middle, 0.0, said.height / 2]))
-            yield Solid(board, place, turn, _narrower(board, middle / said.outer))
+        for board, at, turn, sector in ring_boards((said.inner, said.outer), said.height, said.boards):
+            yield Solid(board, np.array(at), np.array(turn), sector)
 
 
 def _whole(shape: Shape, at: Array) -> Solid:
@@ -226,14 +226,4 @@ def _unit(axis: Vec3) -> Vec3:
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
         raise KeyFault("an axis has a length", "axis")
-    return _vec(np.array(axis) / length)
-
-
-def _vec(values: Array) -> Vec3:
-    x, y, z = values.tolist()
-    return (x, y, z)
-
-
-def _quat(values: Array) -> Quat:
-    x, y, z, w = values.tolist()
-    return (x, y, z, w)
+    return tidy(np.array(axis) / length)

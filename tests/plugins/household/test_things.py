@@ -115,3 +115,11 @@ def test_a_pack_of_a_stranger_has_its_own_materials(tmp_path: Path) -> None:
     assert np.isclose(model.bodies[0].inertial.mass, 0.1)
     with pytest.raises(AttributeError, match="no thing 'rug'"):
         pack(tmp_path)("rug")
+
+
+def test_two_things_of_one_name_are_told_with_the_file(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.yaml").write_text("things: {mat: {mass: 0.1, pieces: {a: {sphere: 0.1}}}}\n")
+    with pytest.raises(SpecError, match="another file of the pack has mat already") as caught:
+        things(tmp_path)
+    assert "b.yaml" in str(caught.value)
