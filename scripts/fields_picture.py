@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pictures import ENGINES, side_by_side
 from PIL import Image, ImageDraw
 
 import anysim
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-ENGINES = ("mujoco", "pybullet", "sapien")
 STEPS = 150
 
 
@@ -42,16 +42,6 @@ def world() -> dict[str, Any]:
             "steam": {**steam, "emission": 4e-4, "wind": [0.15, 0, 0], "lifetime": 3.0},
         },
     }
-
-
-def seen(engine: str) -> Any:
-    """(H, W, 3) uint8."""
-    run = {"engine": engine, "physics": {"dt": 0.004, "control_dt": 0.02}, "world": world()}
-    with anysim.make({**run, "task": {"observations": {"policy": ["last_action"]}}}) as env:
-        env.reset(seed=0)
-        for _ in range(STEPS):
-            env.step([[]])
-        return env.engine.render("eye")["rgb"][0]
 
 
 def pulls(engine: str, moment: float = 2.0, mass: float = 0.1) -> Any:
@@ -144,5 +134,4 @@ def physics() -> Image.Image:
 
 if __name__ == "__main__":
     physics().save(IMAGES / "fields_physics.png", optimize=True)
-    made = np.concatenate([seen(engine) for engine in ENGINES], axis=1)
-    Image.fromarray(made).save(IMAGES / "fields.png", optimize=True)
+    side_by_side(world(), "eye", STEPS).save(IMAGES / "fields.png", optimize=True)

@@ -3,13 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from PIL import Image
-
-import anysim
+from pictures import side_by_side
 
 PATH = Path(__file__).parents[1] / "docs" / "images" / "garments.jpg"
-ENGINES = ("mujoco", "pybullet", "sapien")
 STEPS = 40
 
 
@@ -38,15 +34,5 @@ def world() -> dict[str, Any]:
     }
 
 
-def seen(engine: str) -> Any:
-    """(H, W, 3) uint8."""
-    run = {"engine": engine, "physics": {"dt": 0.004, "control_dt": 0.02}, "world": world()}
-    with anysim.make({**run, "task": {"observations": {"policy": ["last_action"]}, "horizon": 1000}}) as env:
-        env.reset(seed=0)
-        for _ in range(STEPS):
-            env.step([[]])
-        return env.engine.render("eye")["rgb"][0]
-
-
 if __name__ == "__main__":
-    Image.fromarray(np.concatenate([seen(engine) for engine in ENGINES], axis=1)).save(PATH, quality=80, optimize=True)
+    side_by_side(world(), "eye", STEPS).save(PATH, quality=80, optimize=True)

@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 from benchmark_table import table
 from generated import ROOT, main
-from PIL import Image
+from pictures import ENGINES, begun, side_by_side
 
-import anysim
 from anysim.assets.model import ImportedModel
 from anysim.assets.procedural import build
 from anysim.conventions import Array
@@ -34,7 +33,6 @@ from anysim_schemas.load import load
 
 STORE = ROOT / "docs" / "household.json"
 PICTURES = ROOT / "docs" / "images"
-ENGINES = ("mujoco", "pybullet", "sapien")
 FILES = {"kitchen": 0.46, "food": 0.25, "tools": 0.58, "home": 0.5}
 """And how far apart their things are drawn [m]."""
 SPACING, COLUMNS = 0.55, 10
@@ -63,17 +61,10 @@ def world(names: Sequence[str], columns: int, spacing: float) -> dict[str, Any]:
     return made
 
 
-def env_of(engine: str, made: dict[str, Any]) -> Any:
-    """One env without a task."""
-    run = {"engine": engine, "physics": {"dt": 0.002, "control_dt": 0.02}, "world": made}
-    return anysim.make({**run, "task": {"observations": {"policy": ["last_action"]}}})
-
-
 def settled(engine: str) -> dict[str, list[float]]:
     """Of each thing: how far it is from where it was set down [m], how high [m], and its turn [rad]."""
     names = sorted(things(OBJECTS))
-    with env_of(engine, world(names, COLUMNS, SPACING)) as env:
-        env.reset(seed=0)
+    with begun(engine, world(names, COLUMNS, SPACING), dt=0.002) as env:
         before = env.engine.get_state().body_pose[0].copy()
         for _ in range(round(SECONDS / 0.02)):
             env.step([[]])
@@ -97,14 +88,8 @@ def draw(file: str) -> None:
     middle = [0.1 - depth / 2, -width / 2, 0.0]
     eye = [0.45 + 0.72 * width, -width / 2, 0.35 + 0.8 * width]
     made["cameras"] = {"above": {"from": eye, "look_at": middle, "fov": 40.0, "size": [520, 400]}}
-    images: list[Any] = []
-    for engine in ENGINES:
-        with env_of(engine, made) as env:
-            env.reset(seed=0)
-            for _ in range(20):
-                env.step([[]])
-            images.append(env.engine.render("above")["rgb"][0])
-    Image.fromarray(np.concatenate(images, axis=1)).save(PICTURES / f"household_{file}.jpg", quality=82, optimize=True)
+    picture = side_by_side(made, "above", 20, dt=0.002)
+    picture.save(PICTURES / f"household_{file}.jpg", quality=82, optimize=True)
 
 
 def told() -> dict[str, Any]:

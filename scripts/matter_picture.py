@@ -6,13 +6,9 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from PIL import Image
-
-import anysim
+from pictures import side_by_side
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "matter.jpg"
-ENGINES = ("mujoco", "pybullet", "sapien")
 STEPS = 25
 
 
@@ -32,15 +28,5 @@ def world() -> dict[str, Any]:
     return made
 
 
-def seen(engine: str) -> Any:
-    """(H, W, 3) uint8."""
-    run = {"engine": engine, "physics": {"dt": 0.004, "control_dt": 0.02}, "world": world()}
-    with anysim.make({**run, "task": {"observations": {"policy": ["last_action"]}}}) as env:
-        env.reset(seed=0)
-        for _ in range(STEPS):
-            env.step([[]])
-        return env.engine.render("eye")["rgb"][0]
-
-
 if __name__ == "__main__":
-    Image.fromarray(np.concatenate([seen(engine) for engine in ENGINES], axis=1)).save(PICTURE, quality=85)
+    side_by_side(world(), "eye", STEPS).save(PICTURE, quality=85)

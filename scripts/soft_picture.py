@@ -3,18 +3,14 @@
 `python scripts/soft_picture.py` writes them and prints the figures of docs/soft.md.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pictures import begun, side_by_side
 from PIL import Image, ImageDraw
 
-import anysim
-
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-ENGINES = ("mujoco", "pybullet", "sapien")
 STEPS = 25
 
 
@@ -39,23 +35,6 @@ def world() -> dict[str, Any]:
             "cloth": cloth,
         },
     }
-
-
-@contextmanager
-def begun(engine: str, world: dict[str, Any]) -> Iterator[anysim.TaskEnv]:
-    """An env after its reset."""
-    run = {"engine": engine, "physics": {"dt": 0.004, "control_dt": 0.02}, "world": world}
-    with anysim.make({**run, "task": {"observations": {"policy": ["last_action"]}, "horizon": 1000}}) as env:
-        env.reset(seed=0)
-        yield env
-
-
-def seen(engine: str) -> Any:
-    """(H, W, 3) uint8."""
-    with begun(engine, world()) as env:
-        for _ in range(STEPS):
-            env.step([[]])
-        return env.engine.render("eye")["rgb"][0]
 
 
 def beam(steps: int = 50) -> tuple[Any, Any, str]:
@@ -112,7 +91,7 @@ def plot(curves: list[tuple[Any, Any, str]], size: tuple[int, int] = (480, 300))
 
 
 if __name__ == "__main__":
-    Image.fromarray(np.concatenate([seen(engine) for engine in ENGINES], axis=1)).save(IMAGES / "soft.jpg", quality=85)
+    side_by_side(world(), "eye", STEPS).save(IMAGES / "soft.jpg", quality=85)
     curves = [beam(), chain()]
     plot(curves).save(IMAGES / "soft_physics.png", optimize=True)
     for _, _, words in curves:
