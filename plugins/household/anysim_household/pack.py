@@ -90,8 +90,10 @@ def _builder(folder: Path, name: str) -> Callable[..., ImportedModel]:
     def build(*, color: Color | None = None) -> ImportedModel:
         return built(name, *things(folder)[name], color)
 
+    thing, _ = things(folder)[name]
+    moves = f", with moving parts: {', '.join(thing.links)}" if thing.links else ""
     build.__name__ = build.__qualname__ = name
-    build.__doc__ = f"A {name.replace('_', ' ')}; `color` is that of all pieces of what its first is made of."
+    build.__doc__ = f"{name.replace('_', ' ').capitalize()} of {thing.mass:g} kg{moves}."
     return build
 
 
