@@ -31,10 +31,10 @@ RESET_ORDER = (
     "curriculum",
     "terrain",
     "population",
+    "robot",
     "layout",
     "scene",
     "parameters",
-    "robot",
     "action",
     "families",
     "light",
@@ -43,9 +43,9 @@ RESET_ORDER = (
     "sensors",
     "task",
 )
-"""How much of each spread is drawn from, then the ground, what is there, where it is and what it is like, how its
-joints stand and what pulls at it, then the robots and what their drives hold, the families, the lights, the cameras
-and sensors, and the task last, on the settled scene."""
+"""How much of each spread is drawn from, then the ground, what is there, the robots, where things are around them and
+what they are like, how their joints stand and what pulls at them, what drives hold, the families, the lights, the
+cameras and sensors, and the task last, on the settled scene."""
 
 
 class Overridable(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
-from anysim.geometry.convex_parts import Solid, row_of
+from anysim.geometry.convex_parts import Solid, pose_of, row_of
 from anysim.managers.base import WORLD, Manager, Overridable, drawn
 from anysim.managers.layout_proposals import ProposalSource, Proposed
 from anysim.math import pose as P
@@ -22,6 +22,7 @@ from anysim.placement.nominal import nominal_place, roots_at
 from anysim.placement.order import entry_of, placement_order
 from anysim.placement.sampler import EpisodeSampler, NominalSampler, PlacementSampler
 from anysim.placement.search import NoPlace, RefusedProposal, Search, is_constant
+from anysim.randomization.draw import is_random
 from anysim_schemas.layout import PlaceFields, RepairSpec
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -64,6 +65,9 @@ class LayoutManager(Manager):
             for item in self._others
             for entity in item.entities
         }
+        robots = content.robots.items()
+        drawn_robots = {name for name, robot in robots if is_random(robot.position) or is_random(robot.yaw)}
+        self._drawn_robots = {k for k, entity in enumerate(world.entities) if entity.name in drawn_robots}
         self._columns()
 
     def _solid(self, entity: int) -> Solid:
@@ -145,7 +149,7 @@ class LayoutManager(Manager):
         for item in self._others:
             entity = there[item.name]
             if entity is not None:
-                settled[item.name] = self._shifted(entity, origin)
+                settled[item.name] = self._shifted(env, entity, origin)
 
         def sampler(task: PlacementTask, tick: int) -> PlacementSampler:
             return middles.get(task.item.name) or self._sampler(env, task, tick)
@@ -166,8 +170,12 @@ class LayoutManager(Manager):
             self._source.dismiss(env, self.streams, str(error), tasks)
             return search().solve(tasks)
 
-    def _shifted(self, entity: int, origin: Sequence[float]) -> SettledObject:
-        still = self._still[entity]
+    def _shifted(self, env: int, entity: int, origin: Sequence[float]) -> SettledObject:
+        """What has no entry: where it is initially, from the origin of the env; a robot where it has just been put."""
+        still, root = self._still[entity], self._world.entities[entity].root
+        if entity in self._drawn_robots:
+            row = self.engine.get_state().body_pose[env, root]
+            return still._replace(placed=self._solid(entity).at(pose_of(row)))
         if not any(origin):
             return still
         pose = still.placed.pose

@@ -20,7 +20,7 @@ from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
 from anysim_navigation.limits import BaseKind, BaseLimits
 from anysim_navigation.maps import NavMaps
 from anysim_navigation.movers import Movers
-from anysim_navigation.navmesh import NavMesh
+from anysim_navigation.navmesh import NavMesh, length_of
 from anysim_navigation.pose_control import PoseControl, in_frame
 from anysim_navigation.progress import Progress
 from anysim_navigation.robot_shape import agent_of
@@ -40,7 +40,9 @@ CAR_STOPS = 0.15
 CUSP = 0.05
 """[m] before it changes its direction a car may do so."""
 REPLANS = 12
-"""Ways in a row that did not bring a base on before it gives up."""
+"""Ways in a row that did not bring a base nearer to its end before it gives up; a third of them where nobody moves."""
+NEARER = 0.1
+"""[m] of the way that count as nearer."""
 SNAP = 0.6
 """[m] by which the base may stand off the mesh: something may have come near it."""
 
@@ -62,6 +64,7 @@ class Errand(NamedTuple):
     mode: int
     steps: int
     replans: int
+    least: float
     progress: Progress | None
     gear: float
     later: tuple[tuple[Array, float], ...]
@@ -107,6 +110,8 @@ class BaseRouter:
         self.target, self.twist = np.zeros((2, n, 3))
         self.mode = np.full(n, Mode.STAND, dtype=np.int64)
         self._steps, self._replans = np.zeros((2, n), dtype=np.int64)
+        self._least = np.full(n, np.inf)
+        """(N,) [m] the least that was left of any way."""
         self._progress: list[Progress | None] = [None] * n
         self._gear = np.zeros(n)
         """Of a car on its way: 1 forwards, -1 backwards."""
@@ -117,6 +122,7 @@ class BaseRouter:
     def go(self, ids: Array, target: Array, mode: Mode = Mode.ROUTE) -> None:
         """Go to x, y, yaw (n, 3) in these envs."""
         self.target[ids], self.mode[ids], self._steps[ids], self._replans[ids] = target, mode, 0, 0
+        self._least[ids] = np.inf
         for env in ids.tolist():
             self._progress[env] = None
             self.refused.pop(env, None)
@@ -154,6 +160,7 @@ class BaseRouter:
                 int(self.mode[env]),
                 int(self._steps[env]),
                 int(self._replans[env]),
+                float(self._least[env]),
                 copy(self._progress[env]),
                 float(self._gear[env]),
                 tuple(self._later[env]),
@@ -166,7 +173,7 @@ class BaseRouter:
         """Go on in these envs with what a snapshot knew, row by row."""
         for env, one in zip(ids.tolist(), errands, strict=True):
             self.target[env], self.twist[env], self.mode[env] = one.target, one.twist, one.mode
-            self._steps[env], self._replans[env] = one.steps, one.replans
+            self._steps[env], self._replans[env], self._least[env] = one.steps, one.replans, one.least
             self._progress[env], self._later[env] = copy(one.progress), list(one.later)
             self._gear[env] = one.gear
             self.refused.pop(env, None)
@@ -194,13 +201,13 @@ class BaseRouter:
         """Where the base is on its way; a way is made where there is none, or it has become stale."""
         progress = self._progress[env]
         if progress is not None:
-            before = progress.arc
             progress.look(pose[:2], STEP)
-            if progress.arc > before + 1e-3 and progress.off < 0.3:
-                self._replans[env] = 0 if progress.idle == 0.0 else self._replans[env]
+            left = progress.left + sum(length_of(path) for path, _ in self._later[env])
+            if left < self._least[env] - NEARER and progress.off < 0.3:
+                self._replans[env], self._least[env] = 0, left
             if not progress.stale or progress.recovering > 0:
                 return
-        if self._replans[env] > REPLANS:
+        if self._replans[env] > (REPLANS if self._movers.names else REPLANS // 3):
             self._refuse(env, "the base does not get on along any way that it has tried")
             return
         try:

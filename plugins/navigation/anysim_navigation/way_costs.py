@@ -7,11 +7,14 @@ from anysim_navigation.agent import NoRoute
 from anysim_navigation.navmesh import NavMesh, length_of
 from anysim_navigation.router import SNAP, BaseRouter
 
+TIGHTER = 1.0
+"""[m] what a way counts for beside its length for each mesh with more room that has none."""
+
 
 def way_lengths(router: BaseRouter, ids: Array, start: Array, places: Array) -> Array:
     """(n, C) [m] from starts (n, 2 or more) to places (n, C, 2 or more) over the mesh of each env; inf without a way.
 
-    They are over the mesh with the most room that has one.
+    They are over the mesh with the most room that has one, and tight ones count for more.
     """
     lengths = np.full(places.shape[:2], np.inf)
     for row, env in enumerate(ids.tolist()):
@@ -22,10 +25,10 @@ def way_lengths(router: BaseRouter, ids: Array, start: Array, places: Array) -> 
 
 
 def _length(meshes: list[NavMesh], start: Array, place: Array) -> float:
-    for mesh in meshes:
+    for number, mesh in enumerate(meshes):
         try:
             path = mesh.path(start, place, snap=SNAP)
         except NoRoute:
             continue
-        return length_of(np.concatenate([start[None], path[1:-1], place[None]]))
+        return length_of(np.concatenate([start[None], path[1:-1], place[None]])) + number * TIGHTER
     return float("inf")

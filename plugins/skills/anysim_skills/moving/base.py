@@ -29,9 +29,6 @@ GAIN = 4.0
 BACKWARDS = 0.3
 """[m] what lies behind a differential base and is not further away is reached backwards."""
 
-HELD_UP = 75
-"""Control steps in which a base that is not at its goal has neither come nearer nor turned: something holds it."""
-
 _BASES: PerEnv[tuple[str, str, str, str], "Base"] = PerEnv()
 
 
@@ -76,7 +73,7 @@ class Base(Mover):
             )
         self.sideways = labels == HOLONOMIC
         self.target, self.no_way = np.zeros((env.num_envs, 3)), np.zeros(env.num_envs, dtype=bool)
-        self.pace, self.close, self.held_up = Pace(), 0.01, HELD_UP
+        self.pace, self.close, self.held_up = Pace(), 0.01, 75
         self._fresh = np.ones(env.num_envs, dtype=bool)
         self._mode = np.zeros(env.num_envs, dtype=np.int64)
         self._ahead = np.ones(env.num_envs)
