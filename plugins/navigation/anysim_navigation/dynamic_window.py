@@ -12,8 +12,6 @@ from anysim_sensors.states import OCCUPIED
 
 STEP = 0.1
 """[s] of a rollout's steps, and between ticks."""
-
-
 AIMS = (1.0, 0.8, 0.6, 0.45, 0.3)
 """Shares of its reach at which the point is looked for that a base makes for."""
 
@@ -110,8 +108,7 @@ class DynamicWindow:
 
         limits, out = self.limits, np.zeros(3)
         low, high = limits.low.copy(), limits.high.copy()
-        if gear:
-            (high if gear < 0 else low)[0] = 0.0
+        low[0], high[0] = low[0] * (gear <= 0), high[0] * (gear >= 0)
         cost, clearance = window.choose(
             field,
             float(cell),

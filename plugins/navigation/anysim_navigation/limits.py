@@ -108,11 +108,8 @@ def limits_of(
         back = speed if kind is BaseKind.HOLONOMIC else speed / 2
     if kind is BaseKind.ACKERMANN and turning_radius <= 0:
         raise AnysimError("a car has a turning_radius above 0 [m]: wheelbase / tan(most steering)")
-    high = np.array([speed, side, turn])
-    low = np.array([-back, -side, -turn])
-    made = BaseLimits(
-        kind, low, high, np.array([acceleration[0], acceleration[0], acceleration[1]]), discs, turning_radius
-    )
+    low, high = np.array([-back, -side, -turn]), np.array([speed, side, turn])
+    made = BaseLimits(kind, low, high, np.array([*acceleration[:1], *acceleration]), discs, turning_radius)
     made.check()
     return made
 

@@ -5,6 +5,7 @@ end of the way, and in mode DIRECT from the beginning, the base goes straight to
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from copy import copy
 from enum import IntEnum
 from typing import NamedTuple
@@ -29,10 +30,7 @@ from anysim_sensors.sight.eye import Eye
 from anysim_sensors.tables import GeomPoses
 
 ROOM = (0.12, 0.06, 0.04, 0.02)
-"""[m] beyond its radius that ways keep from things: as much as makes following them easy, else what fits.
-
-Gaps that the last alone gets through are mostly too tight to be steered through on a scan with cells of 4 cm.
-"""
+"""[m] beyond its radius that ways keep from things: as much as makes following them easy, else what fits."""
 NEAR = 0.35
 """[m] from its end a way is left for the straight line, if that is free."""
 CAR_STOPS = 0.15
@@ -57,16 +55,10 @@ class Mode(IntEnum):
 
 
 class Errand(NamedTuple):
-    """What a router knows of one env: where the base goes, what it was told last, and where it is on its way."""
+    """What a router knows of one env: its rows, and where the base is on its way."""
 
-    target: Array
-    twist: Array
-    mode: int
-    steps: int
-    replans: int
-    least: float
+    rows: dict[str, Array]
     progress: Progress | None
-    gear: float
     later: tuple[tuple[Array, float], ...]
     refused: str | None
 
@@ -153,29 +145,18 @@ class BaseRouter:
 
     def snapshot(self, ids: Array) -> tuple[Errand, ...]:
         """What it knows of these envs: with a snapshot of the env the drive goes on from here again."""
+        rows = ({name: getattr(self, name)[env].copy() for name in _ROWS} for env in ids)
         return tuple(
-            Errand(
-                self.target[env].copy(),
-                self.twist[env].copy(),
-                int(self.mode[env]),
-                int(self._steps[env]),
-                int(self._replans[env]),
-                float(self._least[env]),
-                copy(self._progress[env]),
-                float(self._gear[env]),
-                tuple(self._later[env]),
-                self.refused.get(env),
-            )
-            for env in ids.tolist()
+            Errand(row, copy(self._progress[env]), tuple(self._later[env]), self.refused.get(env))
+            for row, env in zip(rows, ids.tolist(), strict=True)
         )
 
     def restore(self, ids: Array, errands: Sequence[Errand]) -> None:
         """Go on in these envs with what a snapshot knew, row by row."""
         for env, one in zip(ids.tolist(), errands, strict=True):
-            self.target[env], self.twist[env], self.mode[env] = one.target, one.twist, one.mode
-            self._steps[env], self._replans[env], self._least[env] = one.steps, one.replans, one.least
+            for name in _ROWS:
+                getattr(self, name)[env] = one.rows[name]
             self._progress[env], self._later[env] = copy(one.progress), list(one.later)
-            self._gear[env] = one.gear
             self.refused.pop(env, None)
             if one.refused is not None:
                 self.refused[env] = one.refused
@@ -243,10 +224,8 @@ class BaseRouter:
             (first, self._gear[env]), *self._later[env] = found
             return first
         for maps in self._maps[:-1]:
-            try:
+            with suppress(NoRoute):
                 return self._joined(pose[:2], maps.at(poses, present).path(pose[:2], end, snap=SNAP), end)
-            except NoRoute:
-                continue
         return self._joined(pose[:2], self._maps[-1].at(poses, present).path(pose[:2], end, snap=SNAP), end)
 
     @staticmethod
@@ -294,6 +273,9 @@ class BaseRouter:
         no_movers, discs = np.zeros((0, 5)), self.limits.discs
         points = np.linspace(0.0, 1.0, 6)[1:, None] * way
         return all(clearance(field, self._grid.cell, discs, no_movers, x, y, 0.0, 0.0) > -0.02 for x, y in points)
+
+
+_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear")
 
 
 def pose_of(pose: Array) -> Array:

@@ -1,5 +1,7 @@
 """Lengths of the ways to many places: what a choice among stands costs a base."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from anysim.conventions import Array
@@ -26,9 +28,7 @@ def way_lengths(router: BaseRouter, ids: Array, start: Array, places: Array) -> 
 
 def _length(meshes: list[NavMesh], start: Array, place: Array) -> float:
     for number, mesh in enumerate(meshes):
-        try:
+        with suppress(NoRoute):
             path = mesh.path(start, place, snap=SNAP)
-        except NoRoute:
-            continue
-        return length_of(np.concatenate([start[None], path[1:-1], place[None]])) + number * TIGHTER
+            return length_of(np.concatenate([start[None], path[1:-1], place[None]])) + number * TIGHTER
     return float("inf")
