@@ -91,7 +91,7 @@ def contents(folder: Path) -> dict[str, Any]:
 
 
 def written(words: list[str], command_line: Typer, run: Path, here: Path) -> dict[str, Any]:
-    """What a command leaves in a folder with a run, a job of stills and a protocol; RUN and OUT stand for its places."""
+    """What a command leaves in a folder with a run, a job of stills and a protocol; RUN and OUT stand for places."""
     here.mkdir()
     for file, text in (("desk.yaml", WORLD), ("stills.yaml", STILLS), ("tiny.yaml", PROTOCOL)):
         (here / file).write_text(text)
