@@ -119,7 +119,7 @@ class ChunkEnv:
         obs, infos = [step.obs for step in steps], [step.infos for step in steps]
         terminations = np.stack([step.terminations for step in steps], axis=1)
         truncations = np.stack([step.truncations for step in steps], axis=1)
-        done = (terminations | truncations).any(axis=1)
+        done = np.any(terminations | truncations, axis=1)
         if self.auto_reset or self.ignore_terminations:
             terminations, truncations = _last(terminations), _last(truncations)
         if self.auto_reset and done.any():
