@@ -15,6 +15,7 @@ ROBOMIMIC := .venv-lerobot/with-robomimic
 RLDS := .venv-rlds/installed
 STRANDS := .venv-strands/installed
 OPENENV := .venv-openenv/installed
+VLA := .venv-vla/installed
 RERUN := .venv-rerun/installed
 MCPOLD := .venv-mcp-old/installed
 RAY := .venv-ray/installed
@@ -38,7 +39,7 @@ $(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % s
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-openenv test-rerun test-viewers test-mcp-old test-ray check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-openenv test-vla test-rerun test-viewers test-mcp-old test-ray check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -142,6 +143,16 @@ test-openenv: $(OPENENV)  ## run the checks with OpenEnv's own client, in an env
 $(OPENENV): $(TEST) plugins/adapters/pyproject.toml
 	$(call beside,.venv-openenv)
 	.venv-openenv/bin/python -m pip install --quiet openenv==0.10.0
+	@touch $@
+
+test-vla: $(VLA)  ## run the checks with openpi's own client and under vla-eval's harness, in an environment with both
+	.venv-vla/bin/python -m pytest -n 0 tests/plugins/adapters/test_openpi.py tests/plugins/adapters/test_vla_eval.py $(ARGS)
+
+# openpi-client without its dependencies, which pin an older numpy; it runs with the present one.
+$(VLA): $(TEST) plugins/adapters/pyproject.toml
+	$(call beside,.venv-vla)
+	.venv-vla/bin/python -m pip install --quiet dm-tree vla-eval==0.8.0
+	.venv-vla/bin/python -m pip install --quiet --no-deps openpi-client==0.1.2
 	@touch $@
 
 test-rerun: $(RERUN)  ## run the checks with Rerun's own reader, in an environment with rerun-sdk
@@ -251,5 +262,5 @@ wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.m
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
-	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-strands .venv-openenv .venv-rerun .venv-ray .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-strands .venv-openenv .venv-vla .venv-rerun .venv-ray .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -10,7 +10,8 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim openenv`."""
-    from anysim_adapters.cli import openenv
+    """`anysim openenv` and `anysim openpi`."""
+    from anysim_adapters.cli import openenv, openpi
 
     app.command("openenv")(openenv.openenv)
+    app.command("openpi")(openpi.openpi)

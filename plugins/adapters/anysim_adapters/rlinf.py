@@ -27,7 +27,8 @@ class SingleStep(NamedTuple):
 class Chunk(NamedTuple):
     """Results of one chunk of K steps: a list of K observations and infos; rewards and ends (N, K).
 
-    An end within the chunk stands in its last column. The last observation and infos of an env that ended are those of
+    Where envs are reset by themselves, or terminations ignored, an end within the chunk stands in its last column, else
+    in that of its step. The last observation and infos of an env that ended are those of
     its next episode where envs are reset by themselves; `infos[-1]` then has `final_observation` and `final_info`.
     """
 
@@ -116,10 +117,11 @@ class ChunkEnv:
             raise TaskError(f"chunk_actions are ({self.num_envs}, K, {self.env.action_dim}), got {given.shape}")
         steps = [self.step(given[:, k], auto_reset=False) for k in range(shape[1])]
         obs, infos = [step.obs for step in steps], [step.infos for step in steps]
-        terminations, truncations = np.zeros((2, *shape[:2]), dtype=bool)
-        terminations[:, -1] = np.any([step.terminations for step in steps], axis=0)
-        truncations[:, -1] = np.any([step.truncations for step in steps], axis=0)
-        done = terminations[:, -1] | truncations[:, -1]
+        terminations = np.stack([step.terminations for step in steps], axis=1)
+        truncations = np.stack([step.truncations for step in steps], axis=1)
+        done = np.any(terminations | truncations, axis=1)
+        if self.auto_reset or self.ignore_terminations:
+            terminations, truncations = _last(terminations), _last(truncations)
         if self.auto_reset and done.any():
             obs[-1], infos[-1] = self._next(done, obs[-1], infos[-1])
         return Chunk(obs, np.stack([step.rewards for step in steps], axis=1), terminations, truncations, infos)
@@ -148,3 +150,10 @@ class ChunkEnv:
 
     def close(self) -> None:
         self.env.close()
+
+
+def _last(ends: Array) -> Array:
+    """Ends (N, K) with those of all columns in the last one."""
+    found = np.zeros_like(ends)
+    found[:, -1] = ends.any(axis=1)
+    return found

@@ -1,6 +1,7 @@
 """Policies behind a WebSocket server that speaks openpi's protocol, asked for one env after another."""
 
 import math
+import os
 import weakref
 from contextlib import ExitStack, suppress
 from typing import Annotated, Any
@@ -14,6 +15,8 @@ from anysim.task.contract import Obs
 from anysim.task.env import TaskEnv
 from anysim_policy.names import named
 
+KEY_ENV = "ANYSIM_POLICY_KEY"
+"""The environment variable with the key of a server that asks for one."""
 MESSAGE_BYTES = 64 << 20
 """The longest answer that is read."""
 PROMPT = "prompt"
@@ -55,13 +58,23 @@ class OpenPiEnvPolicy:
         if not math.isfinite(timeout):
             raise TaskError(f"policy.timeout: expected a number of seconds, got {timeout}")
         self._open = ExitStack()
+        key = os.environ.get(KEY_ENV)
+        heads = {"Authorization": f"Api-Key {key}"} if key else None
         try:
             self._socket = self._open.enter_context(
-                connect(url, compression=None, max_size=MESSAGE_BYTES, open_timeout=timeout, close_timeout=1.0)
+                connect(
+                    url,
+                    compression=None,
+                    max_size=MESSAGE_BYTES,
+                    open_timeout=timeout,
+                    close_timeout=1.0,
+                    additional_headers=heads,
+                )
             )
         except (*self._failures, ValueError) as error:
             raise TaskError(
-                f"the policy server {url} cannot be reached ({_words(error)}); start it, or mend the address"
+                f"the policy server {url} cannot be reached ({_words(error)}); start it, or mend the address, or "
+                f"give its key in {KEY_ENV}"
             ) from error
         weakref.finalize(self, self._open.close)
         try:

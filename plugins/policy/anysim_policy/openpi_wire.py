@@ -31,7 +31,7 @@ def unpack(data: bytes) -> Any:
     """
     try:
         return msgpack.unpackb(data, object_hook=_array)
-    except (msgpack.UnpackException, TypeError, KeyError) as error:
+    except (msgpack.UnpackException, TypeError, KeyError, OverflowError, SyntaxError, RecursionError) as error:
         raise ValueError(f"no msgpack of plain arrays ({error!r})") from error
 
 
@@ -50,5 +50,6 @@ def _array(found: dict[Any, Any]) -> Any:
     if dtype.kind not in _KINDS:
         raise ValueError(f"arrays of {dtype} are not read")
     if b"__npgeneric__" in found:
-        return dtype.type(found[b"data"])
+        with np.errstate(all="ignore"):  # a number beyond its type is infinite, and refused where it is used
+            return dtype.type(found[b"data"])
     return np.frombuffer(found[b"data"], dtype).reshape(found[b"shape"])

@@ -19,6 +19,8 @@ SNAPSHOT_TYPE = "application/octet-stream"
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+SCHEMES = ("bearer", "api-key")
+"""Words before the token in the header: that of services, and that of openpi's clients."""
 _HOST = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(:\d{1,5})?")
 
 
@@ -58,7 +60,7 @@ class Gate:
             raise ForbiddenSource("web pages may not ask this service; its owner can allow one: --allow-origin ORIGIN")
         scheme, _, given = headers.get("authorization", "").partition(" ")
         right = hmac.compare_digest(given.strip().encode(), self._token)
-        if self._token and not (right and scheme.lower() == "bearer"):
+        if self._token and not (right and scheme.lower() in SCHEMES):
             raise Unauthorized("the token is missing or wrong; send `Authorization: Bearer TOKEN`, as was printed")
 
     def _bounded(self, receive: Receive, headers: dict[str, str]) -> Receive:

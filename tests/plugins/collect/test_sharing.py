@@ -1,11 +1,7 @@
 """`anysim run --executor`: workers run rounds of episodes, and the trajectories are those of a run in one process."""
 
 import json
-import pickle  # noqa: TID251  as workers get and give what they do
 import shutil
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager
-from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -22,30 +18,12 @@ from anysim_collect.rounds import running_rounds
 from anysim_collect.sharing import Keeper, shared_job
 from anysim_processes import executors
 from tests.plugins.collect.test_interrupted import manifests
+from tests.plugins.processes.pickling import Pickling
 
 EPISODES = 7
 TASK = ["reach", "-n", "3", "-s", "4", "-o", "record.cameras=[]"]
 app = typer.Typer()
 app.command()(cli.run)
-
-
-class Pickling(executors.JobExecutor):
-    """In this process, the second one first; everything is pickled as on its way to a worker and back."""
-
-    rounds = 0
-
-    def treat_all(
-        self,
-        work: Iterable[tuple[Any, ...]],
-        open_: Callable[[], AbstractContextManager[Callable[..., Any]]],
-        workers: int | None = None,
-    ) -> Iterator[Any]:
-        items = iter(work)
-        first = list(islice(items, 2))
-        with pickle.loads(pickle.dumps(open_))() as treat:
-            for item in chain(first[::-1], items):
-                Pickling.rounds += 1
-                yield pickle.loads(pickle.dumps(treat(*pickle.loads(pickle.dumps(item)))))
 
 
 def run(*words: object) -> Any:
@@ -55,7 +33,7 @@ def run(*words: object) -> Any:
 @pytest.fixture(autouse=True)
 def pickling(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(executors, "job_executor", lambda name: Pickling())
-    Pickling.rounds = 0
+    Pickling.items = 0
 
 
 @pytest.fixture(scope="module")
@@ -80,11 +58,11 @@ def test_trajectories_do_not_depend_on_who_runs_them(alone: Path, tmp_path: Path
 
     for name in ("env_0001_episode_0000", "env_0002_episode_0001"):
         shutil.rmtree(out / "episodes" / name)
-    Pickling.rounds = 0
+    Pickling.items = 0
     again = run("-k", EPISODES, "--out", out, "--executor", "pickling", "--json")
     assert again.exit_code == 0, again.output
     told = json.loads(again.output)
-    assert Pickling.rounds == 2
+    assert Pickling.items == 2
     assert sum(one["resumed"] for one in told["episodes"]) == EPISODES - 2
     assert manifests(out) == manifests(alone)
 
@@ -114,7 +92,7 @@ def test_nothing_is_handed_out_once_there_is_enough(tmp_path: Path) -> None:
     found = run("--bytes", "1", "--out", tmp_path / "run", "--executor", "pickling", "--workers", 1)
     assert found.exit_code == 0, found.output
     assert "ended at the limit of 1 bytes" in found.output
-    assert Pickling.rounds == 2
+    assert Pickling.items == 2
     assert len(manifests(tmp_path / "run")) == 6
 
 

@@ -99,6 +99,23 @@ def test_arrays_travel_bit_by_bit() -> None:
             openpi_wire.unpack(wrong)
 
 
+def test_ten_thousand_changed_messages_are_read_or_refused() -> None:
+    """Nothing but ValueError comes out, and no array of another kind."""
+    rng, refused = np.random.default_rng(2), 0
+    frame = openpi_wire.pack({"a": np.arange(3.0), "n": np.float32(2.0), "prompt": "to the left"})
+    for _ in range(10_000):
+        bytes_ = np.frombuffer(frame, np.uint8).copy()
+        bytes_[rng.integers(0, len(bytes_), 3)] = rng.integers(0, 256, 3)
+        try:
+            message = openpi_wire.unpack(bytes_.tobytes())
+        except ValueError:
+            refused += 1
+            continue
+        arrays = [value for value in (message.values() if isinstance(message, dict) else ()) if hasattr(value, "dtype")]
+        assert all(array.dtype.kind in "biuf" for array in arrays)
+    assert 1000 < refused < 10_000
+
+
 def test_each_env_sends_its_observation_and_gets_its_chunk() -> None:
     seen: list[dict[str, Any]] = []
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from typer.testing import CliRunner
 
 pytest.importorskip("ray")
@@ -24,6 +25,7 @@ from anysim_evaluation.cli import evaluate as evaluate_cli
 from anysim_processes.executors import job_executor
 from anysim_ray import crew, node
 from tests.plugins.collect.test_interrupted import manifests
+from tests.plugins.processes.test_commands import short_run, written
 from tests.plugins.ray.cluster_help import add, cluster_of, kill
 
 pytestmark = pytest.mark.filterwarnings("default")  # of Ray's own
@@ -112,8 +114,6 @@ def test_trajectories_survive_nodes_that_are_killed(cluster: Any, tmp_path: Path
 
 
 def test_evaluations_are_equal(cluster: Any, tmp_path: Path) -> None:
-    import typer
-
     app = typer.Typer()
     app.command()(evaluate_cli.evaluate)
     words = ["reach", "-k", "6", "-p", "expert:sigma=0.5"]
@@ -124,7 +124,30 @@ def test_evaluations_are_equal(cluster: Any, tmp_path: Path) -> None:
     assert alone.read_bytes() == shared.read_bytes()
 
 
-def test_a_run_at_an_address_films_and_exports_the_same(cluster: Any, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory, command_line: typer.Typer) -> Path:
+    return short_run(command_line, tmp_path_factory.mktemp("recorded") / "run")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["render", "RUN", "-c", "front"],
+        ["render", "RUN", "-c", "front", "--annotate", "boxes_2d"],
+        ["render", "stills.yaml", "--out", "OUT"],
+        ["benchmark", "run", "tiny.yaml", "--out", "OUT"],
+    ],
+    ids=["films", "annotations", "stills", "benchmark"],
+)
+def test_films_stills_and_benchmarks_are_equal(
+    words: list[str], cluster: Any, command_line: typer.Typer, recorded: Path, tmp_path: Path
+) -> None:
+    alone = written(words, command_line, recorded, tmp_path / "alone")
+    shared = written([*words, "--executor", "ray"], command_line, recorded, tmp_path / "shared")
+    assert shared == alone
+
+
+def test_a_run_at_an_address_exports_the_same(cluster: Any, tmp_path: Path) -> None:
     address = f"ray:address={cluster[0].address}"
     run = ["run", "reach", "-n", 1, "-k", 2, "-o", "record.cameras=[]"]
     for name, more in (("alone", []), ("ray", ["--executor", address])):

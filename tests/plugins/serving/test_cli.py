@@ -69,18 +69,28 @@ def test_it_serves_and_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, num
 
 
 @pytest.mark.slow
-def test_one_that_is_killed_leaves_its_clients_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_that_is_killed_leaves_its_clients_an_error_and_another_takes_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("ANYSIM_STATE_DIR", str(tmp_path / "state"))
     process, lines = started(tmp_path, "--no-token")
     try:
         assert "warning: there is no token" in "".join(lines)
-        env = anysim.connect(re.search(r"http://[0-9.:]+", "".join(lines)).group())  # type: ignore[union-attr]
+        address = re.search(r"http://[0-9.:]+", "".join(lines)).group()  # type: ignore[union-attr]
+        env = anysim.connect(address)
         env.reset(seed=0)
         process.kill()
         process.wait()
+        process.stdout.close()  # type: ignore[union-attr]
         with pytest.raises(ConnectionLost):
             env.step(np.zeros((1, 0)))
+        process, _ = started(tmp_path, "--no-token", "--port", address.rpartition(":")[2])
+        with pytest.raises(ConnectionLost):
+            env.reset(seed=0)  # its session went with the first one
         env.close()
+        with anysim.connect(address) as again, local() as near:
+            assert same(again.reset(seed=3), near.reset(seed=3))
+            assert same(tuple(again.step(np.zeros((1, 0)))), tuple(near.step(np.zeros((1, 0)))))
     finally:
         process.kill()
         process.wait()

@@ -1,12 +1,12 @@
 """`anysim openenv`: a task for clients of OpenEnv."""
 
-import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from anysim.cli.options import Engine, Overrides
+from anysim_adapters.cli.listening import run, settings_of
 
 PORT = 8472
 
@@ -34,25 +34,9 @@ def openenv(
       anysim openenv pick_cube --engine sapien --no-token
     """
     from anysim_adapters.openenv.server import openenv_service
-    from anysim_client.token import TOKEN_ENV
-    from anysim_serving.server import fresh_token
-    from anysim_serving.settings import Limits, Settings
+    from anysim_serving.settings import Limits
 
-    given = os.environ.get(TOKEN_ENV)
-    token = "" if no_token else given or fresh_token()
-    settings = Settings(host, port, token, (), (), tls_certificate, tls_key, Limits(sessions=max_sessions))
+    settings = settings_of(host, port, no_token, tls_certificate, tls_key, Limits(sessions=max_sessions))
     service = openenv_service(task, settings, engine=engine, overrides=tuple(override or ()))
 
-    def told() -> None:
-        typer.echo(f"serving {task} to clients of OpenEnv at {service.address}")
-        if not token:
-            typer.echo(
-                "warning: there is no token: every process and user of this machine can use the service", err=True
-            )
-        else:
-            typer.echo(f"token: {'that of ' + TOKEN_ENV if given else token}")
-        if not settings.on_loopback and tls_certificate is None:
-            typer.echo("warning: without TLS the token and all data can be read on the network between", err=True)
-
-    service.run(told)
-    typer.echo("ended: all envs are freed")
+    run(service, f"serving {task} to clients of OpenEnv")

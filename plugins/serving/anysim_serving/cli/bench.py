@@ -78,7 +78,8 @@ def serve(
         f"fairness {run.fairness:.3f}"
     )
     typer.echo(
-        f"  memory of the service: {run.memory_mb:.1f} MB, at the end {run.memory_end_mb:.1f} MB; left: "
+        f"  memory of the service: {run.memory_mb:.1f} MB, at the end {run.memory_end_mb:.1f} MB, so it grew by "
+        f"{run.memory_end_mb - run.memory_mb:+.1f} MB; left: "
         f"{run.sessions_left} sessions, {run.threads_left} threads"
     )
     for error in run.errors[:8]:

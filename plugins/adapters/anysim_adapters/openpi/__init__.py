@@ -1,0 +1,1 @@
+"""openpi's protocol: policies of anysim for its clients."""
