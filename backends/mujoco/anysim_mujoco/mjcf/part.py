@@ -6,6 +6,7 @@ What a scene says once and for all of it (options, lights, cameras) is no matter
 
 import re
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -111,11 +112,18 @@ def _solid_planes(spec: Any) -> list[ImportNote]:
     return notes
 
 
+def owner_of(root: str, bodies: Iterable[str]) -> str:
+    """What all bodies of a tree are called after: `oven` of `oven.base` and `oven.door`; else the name of the root."""
+    first = root.partition(".")[0]
+    return first if "." in root and all(name.startswith(f"{first}.") for name in bodies) else root
+
+
 def unqualified(model: ImportedModel, name: str) -> ImportedModel:
     """A part of a scene whose names begin where that of the part ends: `cup.handle` of the part `cup` is `handle`."""
     root = model.bodies[0].name
-    qualified = re.compile(rf"{re.escape(name or root)}\.(?=.)")
-    short = lambda text: "" if text == root else qualified.sub("", text, count=1) if qualified.match(text) else text  # noqa: E731
+    owner = owner_of(root, [body.name for body in model.bodies])
+    qualified = re.compile(rf"^{re.escape(owner if owner != root else name or root)}\.(?=.)")
+    short = lambda text: "" if text == owner == root else qualified.sub("", text, count=1)  # noqa: E731
     several = {
         key: tuple(replace(part, name=short(part.name)) for part in getattr(model, key))
         for key in ("bodies", "joints", "geoms", "sites")

@@ -23,7 +23,7 @@ from anysim.errors import listing
 from anysim.math import pose as P
 from anysim_mujoco.mjcf.file import compile_noting, opened
 from anysim_mujoco.mjcf.geoms import pose_of
-from anysim_mujoco.mjcf.part import bodies_of, ground_of
+from anysim_mujoco.mjcf.part import bodies_of, ground_of, owner_of
 from anysim_mujoco.mjcf.unheld import of_scene, value_of
 from anysim_schemas.scene import ImportedScene, SceneEntry, SceneNote, control_step, free_name, placed, roll_pitch_yaw
 
@@ -162,8 +162,9 @@ class _Scene:
 
     def _object(self, part: str) -> None:
         element = self.bodies.get(part)
-        name = self.names[part] = self._name(part or SURROUNDINGS, "body", [*self.names.values(), GROUND])
         number = 0 if element is None else element.id
+        name = self._name(self._owner(part) or SURROUNDINGS, "body", [*self.names.values(), GROUND])
+        self.names[part] = name
         joints = range(self.model.body_jntadr[number], self.model.body_jntadr[number] + self.model.body_jntnum[number])
         free = any(self.model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE for j in joints)
         place = self._pose(number) if free or not joints else pose_of(np.zeros(3), np.eye(4)[0], 1.0)
@@ -171,6 +172,14 @@ class _Scene:
         if not free:
             self._put(("world", "objects", name, "fixed"), True, element)
         self._put(("world", "layout", name), placed(place[:3], place[3:]), element)
+
+    def _owner(self, part: str) -> str:
+        """What a part is called after: the bodies of an entity that was written begin with its name."""
+        if not part or not self.bodies[part].name:
+            return part
+        top = self.bodies[part].id
+        inside = np.flatnonzero(self.model.body_rootid == top)
+        return owner_of(part, [self.model.body(int(number)).name for number in inside])
 
     def _pose(self, number: int) -> Array:
         return pose_of(self.data.xpos[number], self.data.xquat[number], 1.0)
@@ -225,8 +234,8 @@ class _Scene:
             part = next(part for part, element in self.bodies.items() if element.id == top)
             link = self.model.body(body).name or f"body{body}"
             owner = self.names[part]
-            own = f"{part}."
-            mount = owner if body == top and self._still(top) else f"{owner}.{link.removeprefix(own)}"
+            own = self._owner(part)
+            mount = owner if link == own and self._still(top) else f"{owner}.{link.removeprefix(f'{own}.')}"
             return {"mount": mount, "position": pose[:3].tolist(), "roll_pitch_yaw": roll_pitch_yaw(pose[3:])}
         ahead = P.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))
         target = pose[:3] + ahead
