@@ -84,7 +84,7 @@ _TABLE: Sequence[tuple[str, Sequence[Limit]]] = (
         ),
     ),
     ("folders of sources", (FOLDER_ENTRIES,)),
-    ("meshes: STL, OBJ, DAE, GLB, PLY", (MESH_BYTES, MESH_FACES, MESH_NODES, ASSET_BYTES)),
+    ("meshes: STL, OBJ, DAE, GLB, glTF, OFF, 3MF, PLY", (MESH_BYTES, MESH_FACES, MESH_NODES, ASSET_BYTES)),
     ("images", (IMAGE_BYTES, IMAGE_PIXELS)),
     ("arrays and heightfields", (ARRAY_BYTES, GROUND_CELLS)),
     ("snapshots and world states", (SNAPSHOT_BYTES, SNAPSHOT_HEADER_BYTES)),
