@@ -25,7 +25,7 @@ class SceneSpec(Spec):
     What the YAML says of an object, a light or a camera of the file is merged on top; `null` takes it out.
     """
 
-    file: str = Field(description="URI of an MJCF, SDF or USD file, or of another format that a scene reader reads")
+    file: str = Field(description="URI of an MJCF or SDF file, or of another format that a scene reader reads")
     packages: dict[str, str] = Field(default_factory=dict, description=PACKAGES)
     notes: tuple[SceneNote, ...] | None = Field(
         default=None,

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from anysim.assets.bounded_files import xml_root
+from anysim.assets.bounded_files import check, xml_root
 from anysim.assets.model import ImportNote
 from anysim.assets.scene import PART
 from anysim.conventions import GROUND, Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
+from anysim_schemas.limits import SCENE_PARTS
 from anysim_schemas.scene import ImportedScene, SceneEntry, control_step, free_name, placed
 from anysim_urdf.sdf import SdfModel
 from anysim_urdf.sdf_coverage import notes_of
@@ -56,6 +57,7 @@ class _Scene:
             self._put(("world", "terrain"), self._terrain(first), first)
         else:
             self._put(("world", "terrain"), {"kind": "none"}, self.world)
+        check(self.path, SCENE_PARTS, sum(len(model.roots) for model in self.models.values()))
         taken: list[str] = [GROUND]
         for name, model in self.models.items():
             for link in model.roots:

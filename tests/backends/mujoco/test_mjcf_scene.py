@@ -9,7 +9,7 @@ import pytest
 from anysim.api import compile_world, load, make, watched
 from anysim.compile.world import compile_with_report
 from anysim.conventions import WORLD
-from anysim.errors import AnysimError, SpecError
+from anysim.errors import AnysimError, CapabilityError, SpecError
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, World
 from anysim.testing.audit import audit
@@ -145,6 +145,9 @@ def test_faults_have_the_line_of_the_file(folder: Path, tmp_path: Path) -> None:
         (tmp_path / "kitchen.xml").write_text(text)
         with pytest.raises(SpecError, match=rf"world\.yaml:1:\d+: world\.source: .*({message})"):
             load(tmp_path / "world.yaml")
+    (tmp_path / "kitchen.xml").write_text(f"<mujoco><worldbody>{'<body/>' * 201}</worldbody></mujoco>")
+    with pytest.raises(SpecError, match="the limit of a scene file is 200 bodies"):
+        load(tmp_path / "world.yaml")
     with pytest.raises(SpecError, match="leave '#cup' out"):
         load({"world": {"source": f"{folder / 'kitchen.xml'}#cup"}})
     with pytest.raises(SpecError, match="has not been read"):
@@ -168,3 +171,13 @@ def test_engines_build_what_was_read_and_it_falls(engine: str, folder: Path) -> 
         state, world = simulation.get_state(), simulation.world
         number = next(i for i, body in enumerate(world.bodies) if body.name == "ghost")
         assert state.body_pose[0, number, 2] == pytest.approx(2 - 0.5 * 9.8 * (5 * 0.004) ** 2, abs=2e-3)
+
+
+def test_what_an_engine_lacks_is_refused_with_the_line_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "kitchen.xml").write_text("""<mujoco><worldbody>
+  <body name="arm"><joint name="a"/><geom size=".1"/><body><joint name="b"/><geom size=".1"/></body></body></worldbody>
+  <tendon><fixed name="t" range="-1 1"><joint joint="a" coef="1"/><joint joint="b" coef="1"/></fixed></tendon>
+  </mujoco>""")
+    (tmp_path / "world.yaml").write_text("engine: pybullet\nworld: {source: kitchen.xml}\n")
+    with pytest.raises(CapabilityError, match=r"tendon 'arm\.t' is limited .* at .*kitchen\.xml:2:1"):
+        make(watched(load(tmp_path / "world.yaml")), base=tmp_path)

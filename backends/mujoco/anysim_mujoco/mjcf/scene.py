@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from anysim.assets.bounded_files import xml_root
+from anysim.assets.bounded_files import check, xml_root
 from anysim.assets.scene import PART
 from anysim.conventions import GROUND, Array
 from anysim.errors import listing
@@ -25,6 +25,7 @@ from anysim_mujoco.mjcf.file import compile_noting, opened
 from anysim_mujoco.mjcf.geoms import pose_of
 from anysim_mujoco.mjcf.part import bodies_of, ground_of, owner_of
 from anysim_mujoco.mjcf.unheld import of_scene, value_of
+from anysim_schemas.limits import SCENE_PARTS
 from anysim_schemas.scene import ImportedScene, SceneEntry, SceneNote, control_step, free_name, placed, roll_pitch_yaw
 
 SURROUNDINGS = "surroundings"
@@ -66,6 +67,7 @@ def read_mjcf_scene(path: Path, *, root: Path, uri: str, packages: Mapping[str, 
     with opened(path, root) as (spec, said):
         notes = [note for note in said if note.where.partition(" ")[0] not in ("light", "lights", "camera", "cameras")]
         bodies = bodies_of(spec)
+        check(path, SCENE_PARTS, len(bodies))
         notes += of_scene(spec)
         model = compile_noting(spec, notes)
         return _Scene(path, uri, spec, bodies, model, [(n.kind, n.where, n.message) for n in notes]).read()
