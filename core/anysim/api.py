@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from anysim import registry
+from anysim.assets.scene import read_scene
 from anysim.controllers.base import DEFAULT_CONTROLLER
 from anysim.conventions import GROUND
 from anysim.engine.factory import ENGINE_VARIABLE, create_simulation, engine_class
@@ -80,7 +81,13 @@ def load(
     chosen = os.environ.get(ENGINE_VARIABLE)
     beneath = {"engine": chosen} if chosen else None
     return load_run(
-        resolved, overrides=overrides, resolver=resolve_options, extends=_extends, base_data=beneath, past=past
+        resolved,
+        overrides=overrides,
+        resolver=resolve_options,
+        extends=_extends,
+        base_data=beneath,
+        past=past,
+        scene=read_scene,
     )
 
 
@@ -128,13 +135,15 @@ def _asset_folders(loaded: LoadedRun) -> dict[str, Path]:
     keys = {GROUND: "world.terrain.file"}
     for name, thing in loaded.spec.world.objects.items():
         keys[name] = f"world.objects.{name}.source.{_written(thing.source)}"
-    for name, key in keys.items():
-        place = Path(place_of(loaded, key).rsplit(":", 2)[0]).resolve()
-        if place in files:
-            folders[name] = files[place]
-        elif loaded.files:
-            folders[name] = loaded.files[-1].parent
+    others = [files[path] for path in [_file_of(loaded, "world.source"), *list(files)[::-1]] if path in files]
+    for name, key in keys.items():  # what a scene file says is relative to the file that names it
+        if found := [files[place]] if (place := _file_of(loaded, key)) in files else others[:1]:
+            folders[name] = found[0]
     return folders
+
+
+def _file_of(loaded: LoadedRun, key: str) -> Path:
+    return Path(place_of(loaded, key).rsplit(":", 2)[0]).resolve()
 
 
 def _written(source: "Source") -> str:

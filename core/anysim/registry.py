@@ -38,6 +38,7 @@ KINDS: Mapping[str, str] = {
     "streams": "streams of records, which `record.streams` asks for",
     "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
+    "scenes": "readers of whole scene files as worlds, by file format",
     "oracles": "independent readers of robots that importers are held against, by file format",
     "assets": "builders of procedural assets",
     "layouts": "proposers of layouts",
@@ -93,7 +94,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-learning": {"commands": "curves train", "learners": "clone rsl-rl sb3-ppo"},
     "anysim-maniskill": {"benchmarks": "maniskill", "commands": "verdicts"},
     "anysim-mcap": {"exporters": "foxglove", "readers": "mcap", "streams": "cameras", "writers": "mcap"},
-    "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
+    "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf", "scenes": "mjcf"},
     "anysim-navigation": {"commands": "map", "planners": "dynamic_window"},
     "anysim-parity": {"commands": "compare picture"},
     "anysim-policy": {"controllers": "policy", "env_policies": "file lerobot openpi"},
@@ -108,7 +109,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-skills": {"skills": "pick"},
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},
     "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
-    "anysim-urdf": {"importers": "sdf urdf world xacro"},
+    "anysim-urdf": {"importers": "sdf urdf world xacro", "scenes": "sdf world"},
     "anysim-viewer": {"commands": "view", "views": "page"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {

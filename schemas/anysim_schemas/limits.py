@@ -51,6 +51,7 @@ MODEL_INCLUDE_DEPTH = Limit(20, "levels of inclusion", "a model", "include files
 MODEL_SIZE = Limit(1_000, "entries", "a size that an MJCF file asks for", "ask for less")
 MODEL_COMPOSITE = Limit(200, "parts", "a <composite> of an MJCF file", "use fewer parts")
 MODEL_OCTREE = Limit(8, "levels", "an octree of an MJCF mesh", "use fewer levels")
+SCENE_PARTS = Limit(200, "bodies that are objects", "a scene file", "join what stands still to one body")
 MESH_BYTES = Limit(128 * MIB, "bytes", "a mesh file", "decimate the mesh")
 MESH_FACES = Limit(600_000, "triangles", "a mesh file", "decimate the mesh")
 MESH_NODES = Limit(20_000, "nodes", "the scene of a mesh file", "join its parts")
@@ -83,8 +84,9 @@ _TABLE: Sequence[tuple[str, Sequence[Limit]]] = (
             MODEL_OCTREE,
         ),
     ),
+    ("scenes: MJCF and SDF", (SCENE_PARTS,)),
     ("folders of sources", (FOLDER_ENTRIES,)),
-    ("meshes: STL, OBJ, DAE, GLB, PLY", (MESH_BYTES, MESH_FACES, MESH_NODES, ASSET_BYTES)),
+    ("meshes: STL, OBJ, DAE, GLB, glTF, OFF, 3MF, PLY", (MESH_BYTES, MESH_FACES, MESH_NODES, ASSET_BYTES)),
     ("images", (IMAGE_BYTES, IMAGE_PIXELS)),
     ("arrays and heightfields", (ARRAY_BYTES, GROUND_CELLS)),
     ("snapshots and world states", (SNAPSHOT_BYTES, SNAPSHOT_HEADER_BYTES)),

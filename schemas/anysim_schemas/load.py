@@ -18,6 +18,7 @@ from anysim_schemas.nodes import Fault, Node, from_data, in_order
 from anysim_schemas.plugin import OptionsResolver
 from anysim_schemas.run import RunSpec
 from anysim_schemas.salvage import without
+from anysim_schemas.scene import SceneReader, with_scene
 from anysim_schemas.shapes import Shape
 from anysim_schemas.slots import check_slots
 from anysim_schemas.sources import ExtendsResolver, Reader, Source
@@ -83,10 +84,18 @@ def load_run(
     extends: ExtendsResolver | None = None,
     base_data: Mapping[str, Any] | None = None,
     past: list[SpecIssue] | None = None,
+    scene: SceneReader | None = None,
 ) -> LoadedRun:
     """`load` for the root of a run."""
     return load(
-        RunSpec, sources, overrides=overrides, resolver=resolver, extends=extends, base_data=base_data, past=past
+        RunSpec,
+        sources,
+        overrides=overrides,
+        resolver=resolver,
+        extends=extends,
+        base_data=base_data,
+        past=past,
+        scene=scene,
     )
 
 
@@ -99,6 +108,7 @@ def load(
     extends: ExtendsResolver | None = None,
     base_data: Mapping[str, Any] | None = None,
     past: list[SpecIssue] | None = None,
+    scene: SceneReader | None = None,
 ) -> LoadedSpec[M]:
     """Read, merge and validate a spec.
 
@@ -111,6 +121,8 @@ def load(
         base_data: data beneath all files, such as an engine chosen by the environment.
         past: where given, faults that leave the rest of the data whole, such as an unknown key, are added to it in
             place of being raised, and the spec is that of the rest: what else is wrong can still be looked for.
+
+        scene: reads the file that `world.source` names; without it the file stays unread.
 
     Raises:
         SpecError: holds everything that is wrong, in the order of the files.
@@ -127,6 +139,7 @@ def load(
     about, others = split(overrides)
     root = with_level(override(reader.merged(nodes), about, shapes, faults), shapes, faults)
     root = override(with_robot(root, shapes, faults), others, shapes, faults)
+    root = with_scene(root, scene, shapes, faults)
     refused = {fault.mark for fault in faults if fault.mark.line}  # what such a value is taken for says nothing new
     spec, invalid = _validated(model, root, resolver)
     if spec is None or faults or invalid:

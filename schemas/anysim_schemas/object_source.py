@@ -14,7 +14,7 @@ PROCEDURAL = "procedural:"
 """What the URI of a procedural asset begins with."""
 ASSET = "URI of a URDF or MJCF file, FILE.xml#BODY for one of several; or of another format that an importer reads"
 PACKAGES = "folders, as URIs, of packages that a URDF refers to as `package://NAME/…`, by NAME"
-MESH_ENDINGS = (".stl", ".obj", ".dae", ".glb", ".ply")
+MESH_ENDINGS = (".stl", ".obj", ".dae", ".glb", ".gltf", ".off", ".3mf", ".ply")
 
 
 class SourceSpec(Spec):

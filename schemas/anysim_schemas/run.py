@@ -20,6 +20,7 @@ from anysim_schemas.record import RecordSpec
 from anysim_schemas.regions import RegionSpec
 from anysim_schemas.robots import RobotSpec
 from anysim_schemas.rooms import RoomSpec
+from anysim_schemas.scene import SceneSpec
 from anysim_schemas.sensors import SensorSpec
 from anysim_schemas.task import TaskSpec
 from anysim_schemas.terrain import TerrainSpec
@@ -29,6 +30,9 @@ class WorldSpec(Spec):
     """What exists (robots, objects), where it goes (layout), and what looks at it (cameras, sensors, lights)."""
 
     name: Name = Field(default="world", description="the name of the world")
+    source: SceneSpec | None = Field(
+        default=None, description="a scene file of another program, whose bodies are objects of this world"
+    )
     terrain: TerrainSpec = Field(default=TerrainSpec(), description="the ground")
     room: RoomSpec | None = Field(default=None, description="walls around the scene, and furniture")
     robots: dict[Name, RobotSpec] = Field(default_factory=dict, description="robots by name")

@@ -1,5 +1,6 @@
 """Mesh files: units, axes, colours, hulls, budgets, and hashes that do not depend on the cache."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def write(path: Path, mesh: trimesh.Trimesh) -> Path:
-    mesh.export(str(path))
+    if path.suffix == ".gltf":
+        for name, data in trimesh.exchange.gltf.export_gltf(trimesh.Scene(mesh)).items():
+            (path if name == "model.gltf" else path.parent / name).write_bytes(data)
+    elif path.suffix == ".3mf":  # whose unit is the millimetre
+        mesh.copy().apply_scale(1000).export(str(path))
+    else:
+        mesh.export(str(path))
     return path
 
 
@@ -36,6 +43,49 @@ def test_every_format_gives_the_same_box(folder: Path, ending: str) -> None:
     assert hull.faces.shape == (12, 3)
     (part,) = meshes.visual_parts(path)
     np.testing.assert_allclose(part.mesh.vertices.min(axis=0), (-0.1, -0.2, -0.3), atol=1e-6)
+
+
+@pytest.mark.parametrize("ending", [".glb", ".gltf"])
+def test_gltf_has_y_up(folder: Path, ending: str) -> None:
+    path = write(folder / f"box{ending}", trimesh.creation.box((0.2, 0.4, 0.6)))
+    hull = meshes.collision_mesh(path, upright=True)
+    np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), (0.2, 0.6, 0.4), atol=1e-6)
+
+
+def test_3mf_has_a_unit_and_stays_within_its_package(folder: Path) -> None:
+    path = write(folder / "box.3mf", trimesh.creation.box((0.2, 0.4, 0.6)))
+    with zipfile.ZipFile(path) as package:
+        parts = {name: package.read(name) for name in package.namelist()}
+    (model,) = (name for name in parts if name.endswith(".model"))
+
+    def changed(name: str, old: bytes, new: bytes) -> Path:
+        assert old in parts[model]
+        with zipfile.ZipFile(folder / name, "w") as package:
+            for part, data in parts.items():
+                package.writestr(part, data.replace(old, new, 1) if part == model else data)
+        return folder / name
+
+    hull = meshes.collision_mesh(changed("inch.3mf", b'unit="millimeter"', b'unit="inch"'))
+    np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), np.array((0.2, 0.4, 0.6)) * 25.4, atol=1e-6)
+    with pytest.raises(AssetError, match="made of other objects"):
+        meshes.collision_mesh(changed("nested.3mf", b"<mesh>", b"<components/><mesh>"))
+    (folder / "broken.3mf").write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(AssetError, match="cannot be read as a mesh"):
+        meshes.collision_mesh(folder / "broken.3mf")
+
+
+def test_buffers_of_a_gltf_lie_in_its_folder(folder: Path) -> None:
+    inner = folder / "inner"
+    inner.mkdir()
+    path = write(inner / "box.gltf", trimesh.creation.box((0.2, 0.4, 0.6)))
+    first = meshes.collision_mesh(path).hash
+    buffer = inner / "gltf_buffer_0.bin"
+    buffer.write_bytes(buffer.read_bytes() + bytes(4))
+    assert meshes.collision_mesh(path).hash != first, "another buffer is another mesh"
+    path.write_text(path.read_text().replace("gltf_buffer_0.bin", "../secret.bin"))
+    (folder / "secret.bin").write_bytes(buffer.read_bytes())
+    with pytest.raises(AssetError, match="outside of its folder"):
+        meshes.collision_mesh(path)
 
 
 def test_scale_may_mirror_and_faces_stay_outward(folder: Path) -> None:

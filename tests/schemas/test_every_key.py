@@ -88,6 +88,10 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
             (out / folder / f"{name}.obj").write_text(tetrahedron(0.05 + 0.01 * number))
         (out / folder / "one.obj").write_text(tetrahedron(0.04 + 0.0005 * ord(folder[0])))
     (out / "packed.urdf").write_text(PACKED)
+    (out / "packed.sdf").write_text(PACKED_SDF)
+    (out / "scene.xml").write_text(
+        '<mujoco><worldbody><body name="post"><geom size="0.1"/></body></worldbody></mujoco>'
+    )
     for number, name in enumerate("ab"):
         np.save(out / f"{name}.npy", np.arange(9.0).reshape(3, 3) * (0.1 + number))
     (out / "grey.bmp").write_bytes(grey_image())
@@ -106,6 +110,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 PACKED = """<robot name="packed"><link name="it"><inertial><mass value="1"/>
   <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
   <collision><geometry><mesh filename="package://toys/one.obj"/></geometry></collision></link></robot>
+"""
+
+
+PACKED_SDF = """<sdf version="1.9"><world><model name="it"><static>1</static><link name="l"><collision name="c">
+  <geometry>
+  <mesh><uri>package://toys/one.obj</uri></mesh></geometry></collision></link></model></world></sdf>
 """
 
 

@@ -7,6 +7,7 @@ import io
 import json
 import re
 import warnings
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import islice
@@ -142,10 +143,11 @@ def mesh_bytes(path: Path) -> bytes:
     """
     data = bounded(path, MESH_BYTES)
     counts = {".stl": _stl, ".obj": _obj, ".ply": _ply, ".dae": _dae, ".glb": _glb, ".msh": _msh}
+    counts |= {".gltf": _gltf, ".off": _off, ".3mf": _3mf}
     count = counts.get(path.suffix.lower())
     try:
         faces, nodes = (0, 0) if count is None else count(data)
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError, zipfile.BadZipFile) as error:
         raise AssetError(f"{path}: cannot be read as a mesh: {error}") from error
     check(path, MESH_FACES, faces)
     check(path, MESH_NODES, nodes)
@@ -189,9 +191,35 @@ def _glb(data: bytes) -> tuple[int, int]:
     length = int.from_bytes(data[12:16], "little")
     if JSON_BYTES.exceeded(length):
         raise ValueError(f"its JSON {JSON_BYTES.sentence(length)}")
-    tree = json.loads(data[20 : 20 + length])
+    return _gltf(data[20 : 20 + length])
+
+
+def _gltf(data: bytes) -> tuple[int, int]:
+    tree = json.loads(data)
     sizes = [int(accessor.get("count", 0)) for accessor in tree.get("accessors", ())]
     return max(sizes, default=0) // 3, len(tree.get("nodes", ())) + len(sizes)
+
+
+def _off(data: bytes) -> tuple[int, int]:
+    words = re.sub(rb"#[^\r\n]*", b"", data[:4096]).split()
+    numbers = [int(word) for word in words[1 if words[:1] and not words[0].isdigit() else 0 :][:2]]
+    if len(numbers) < 2 or min(numbers) < 0:
+        raise ValueError("it has no count of vertices and faces")
+    return max(numbers[1], numbers[0] // 3, data.count(b"\n") // 4), 0
+
+
+def _3mf(data: bytes) -> tuple[int, int]:
+    """Triangles and parts of the models in the package; what it unpacks to is within the limit of a mesh file."""
+    with zipfile.ZipFile(io.BytesIO(data)) as package:
+        if MESH_BYTES.exceeded(sum(one.file_size for one in package.infolist())):
+            raise ValueError(f"what is in it {MESH_BYTES.sentence()}")
+        models = [one for one in package.infolist() if one.filename.lower().endswith(".model")]
+        texts = [package.open(one).read(MESH_BYTES.value + 1) for one in models]
+    for text in texts:
+        plain_xml(text)
+        if b"component" in text:
+            raise ValueError("its objects are made of other objects, which is not read; export it as one mesh")
+    return sum(text.count(b"triangle ") for text in texts), sum(text.count(b"<item") for text in texts)
 
 
 def _dae(data: bytes) -> tuple[int, int]:

@@ -5,6 +5,7 @@ parameters, never of the result, so that it is equal on all machines.
 """
 
 import io
+import json
 import re
 from collections.abc import Callable
 from functools import lru_cache
@@ -12,6 +13,7 @@ from itertools import islice
 from math import inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -24,13 +26,14 @@ from anysim.math import matrix as M
 from anysim.model.world import Mesh, Vec3
 from anysim_schemas.limits import MESH_BYTES, MESH_FACES
 
-FORMATS = (".stl", ".obj", ".dae", ".glb", ".ply")
+FORMATS = (".stl", ".obj", ".dae", ".glb", ".gltf", ".off", ".3mf", ".ply")
 HULL_VERTICES = 64  # what PhysX takes in a convex mesh with margin; enough for grasping at millimetres
 VISUAL_ERROR = 0.002  # [m] that what is looked at may be off
 VISUAL_COLORS = 6
 SMALL_BYTES = 256_000  # arrays of a mesh up to so large stay in memory
 MATERIAL_FILES = 100  # of one .obj; what it names beyond is not read
 _VERSION = "anysim-mesh-4"  # change with anything that changes the result
+_UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 _ONE: Vec3 = (1.0, 1.0, 1.0)
 Color = tuple[float, float, float, float]
 _units: dict[str, float] = {}
@@ -111,10 +114,10 @@ def visual_parts(
     """What a mesh file looks like: one mesh for each of its colours.
 
     Args:
-        path: one of `FORMATS`. The unit that a .dae declares is applied.
+        path: one of `FORMATS`. The unit that a .dae or .3mf declares is applied.
         scale: component-wise; a negative one mirrors.
-        upright: turn files whose up axis is y (.glb, and .dae that say so) to z up. References in a URDF do not want
-            that: there the axes are taken as they are, whatever the file declares.
+        upright: turn files whose up axis is y (.glb, .gltf, and .dae that say so) to z up. References in a URDF do not
+            want that: there the axes are taken as they are, whatever the file declares.
         error: [m] that the surface may be off, see `anysim.geometry.triangles`; 0 keeps every triangle.
 
     Raises:
@@ -173,7 +176,7 @@ def _key(path: Path, *parameters: object) -> str:
     if path.suffix.lower() not in FORMATS:
         raise AssetError(f"{path}: mesh files are {', '.join(FORMATS)}; '{path.suffix}' is not known")
     data = bounded(path, MESH_BYTES)
-    materials = b"".join(bounded(file, MESH_BYTES) for file in _material_files(path, data))
+    materials = b"".join(bounded(file, MESH_BYTES) for file in _files_beside(path, data))
     key = cache.digest(_VERSION, path.suffix.lower(), data, materials, *(repr(p) for p in parameters))
     unit = _units[key] = _units.get(key) or _declared(path, data).metres
     return key if unit == 1.0 else cache.digest(key, repr(unit))
@@ -213,6 +216,22 @@ def _declared(path: Path, data: bytes) -> _ColladaHead:
     return _ColladaHead(metres, up[0] if up in ("X_UP", "Y_UP", "Z_UP") else "Y")
 
 
+def _files_beside(path: Path, data: bytes) -> list[Path]:
+    """What else a mesh is read from: the .mtl files of an .obj, the buffers of a .gltf, in its own folder."""
+    if path.suffix.lower() != ".gltf":
+        return _material_files(path, data)
+    try:
+        asked = [str(buffer.get("uri", "data:")) for buffer in json.loads(data).get("buffers", ())]
+    except (ValueError, AttributeError, RecursionError) as error:
+        raise AssetError(f"{path}: cannot be read as a mesh: {error}") from error
+    here = path.parent.resolve()
+    files = [(here / unquote(name)).resolve() for name in asked if not name.startswith("data:")]
+    for file in files:
+        if not file.is_relative_to(here):
+            raise AssetError(f"{path}: a buffer lies outside of its folder: {file}")
+    return files
+
+
 def _material_files(path: Path, data: bytes) -> list[Path]:
     """The .mtl files of an .obj that lie in its own folder."""
     if path.suffix.lower() != ".obj":
@@ -227,17 +246,21 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
     import trimesh
     from trimesh.resolvers import FilePathResolver
 
+    data = mesh_bytes(path)
+    kind = path.suffix.lower()
+    buffers = _files_beside(path, data) if kind == ".gltf" else []
+
     class MaterialsOnly(FilePathResolver):
-        """Serves the .mtl of the mesh's own folder: textures are not used, and no other file may be read."""
+        """Serves the .mtl of the mesh's own folder, and buffers: textures are not used, no other file may be read."""
 
         def get(self, name: str) -> bytes:
+            if (buffer := (path.parent / unquote(str(name))).resolve()) in buffers:
+                return bounded(buffer, MESH_BYTES)
             file = path.parent / Path(str(name)).name
             if file.suffix.lower() != ".mtl":
                 raise ValueError(f"'{name}' is not read")
             return bounded(file, MESH_BYTES)
 
-    data = mesh_bytes(path)
-    kind = path.suffix.lower()
     total = 0
     try:
         scene: Any = trimesh.load_scene(io.BytesIO(data), file_type=kind[1:], resolver=MaterialsOnly(str(path)))
@@ -257,21 +280,24 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
                 )
     except AssetError:
         raise
-    except Exception as error:  # parsers of six formats raise what they like
+    except ModuleNotFoundError as error:  # of what trimesh itself needs for some formats only
+        raise AssetError(f"{path}: reading {kind} needs the package {error.name}: pip install {error.name}") from error
+    except Exception as error:  # parsers of nine formats raise what they like
         raise AssetError(f"{path}: cannot be read as a mesh: {type(error).__name__}: {error}") from error
     if not pieces:
         raise AssetError(f"{path}: holds no triangles")
     if not all(np.isfinite(piece.vertices).all() for piece in pieces):
         raise AssetError(f"{path}: holds vertices that are not finite")
     unit, up = _declared(path, data)
+    unit = _UNITS[scene.units or "millimeter"] if kind == ".3mf" else unit
     turn = np.array(scale)[:, None] * (_upright(kind, up) if upright else np.eye(3)) * unit
     flip = M.determinant(turn) < 0
     return [_Piece(M.product(v, turn.T), f[:, ::-1] if flip else f, color) for v, f, color in pieces]
 
 
 def _upright(kind: str, up: str) -> Array:
-    """The turn (3, 3) to z up; a .glb has y up, a .dae what it declares."""
-    if kind == ".glb" or (kind == ".dae" and up == "Y"):
+    """The turn (3, 3) to z up; a .glb or .gltf has y up, a .dae what it declares."""
+    if kind in (".glb", ".gltf") or (kind == ".dae" and up == "Y"):
         return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     if kind == ".dae" and up == "X":
         return np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])

@@ -6,7 +6,7 @@ from math import copysign, inf
 from typing import Any
 
 from anysim.assets.meshes import VISUAL_ERROR
-from anysim.assets.model import ImportedModel
+from anysim.assets.model import ImportedModel, ImportNote
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.errors import AssetError
 from anysim.model.world import (
@@ -112,7 +112,7 @@ class WorldBuilder:
             elif isinstance(shape, HeightFieldShape):
                 shape = HeightFieldShape(full(shape.heightfield))
             self.geoms.append(replace(part, name=full(part.name), body=shift(part.body), shape=shape))
-        self._notes |= dict.fromkeys((category or name, str(note)) for note in model.report)
+        self.note(category or name, model.report)
         self.sites += [replace(part, name=full(part.name), body=shift(part.body)) for part in model.sites]
         self.add_heightfields(replace(field, name=full(field.name)) for field in model.heightfields)
         self.excluded |= {(low + body, high + body) for low, high in model.excluded_pairs}
@@ -133,6 +133,10 @@ class WorldBuilder:
         )
         self.entities.append(entity)
         return entity
+
+    def note(self, name: str, report: Iterable[ImportNote]) -> None:
+        """Keep what an importer says of the thing that is called so."""
+        self._notes |= dict.fromkeys((name, str(note)) for note in report)
 
     def add_mesh(self, mesh: Mesh) -> str:
         """Store a mesh once, however many use it; returns its name in the World, which says its content."""

@@ -72,6 +72,11 @@ def compile_with_report(
     add_terrain(builder, content.terrain, issues.at("terrain"), _base(base, GROUND))
     add_room(builder, content, issues)
     notes: dict[str, tuple[ImportNote, ...]] = {}
+    if content.source is not None:
+        if content.source.notes is None:
+            issues.add("source", "the file has not been read; load the world with `anysim.load` or `anysim.make`")
+        notes["source"] = tuple(ImportNote(*note) for note in content.source.notes or ())
+        builder.note("source", notes["source"])
     for name, robot in content.robots.items():
         notes[name] = tuple(add_robot(builder, name, robot, issues.at("robots", name)))
     check_names(content.objects, content.robots, issues.at("objects"))

@@ -71,8 +71,10 @@ def scene_of(what: str, overrides: tuple[str, ...] = ()) -> Scene:
         return scene_of_world(compile_world(load({"world": world}, overrides=list(overrides))))
     known = [*registry.names("robots"), *registry.names("tasks")]
     if not path.is_file() and what not in known:
+        assets = registry.names("assets")
+        hint = f"; the asset of that name is 'procedural:{what}'" if what in assets else suggest(what, known)
         raise AnysimError(
-            f"there is no robot, task or file '{what}'{suggest(what, known)}; give a name of `anysim list robots` or "
+            f"there is no robot, task or file '{what}'{hint}; give a name of `anysim list robots` or "
             f"`anysim list tasks`, the YAML file of a world, or a model file ({', '.join(sorted(endings))})"
         )
     return scene_of_world(compile_world(load(path if path.is_file() else what, overrides=list(overrides))))

@@ -14,6 +14,7 @@ import numpy as np
 
 from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import Fate, ImportedModel, ImportNote
+from anysim.assets.scene import PART
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.math import pose as P
@@ -47,7 +48,7 @@ def import_sdf(
         AssetError: a missing or damaged file or mesh, or something the neutral model cannot say.
     """
     read = document(path, root, packages)
-    element, link = chosen(read, body)
+    element, link = chosen(read, body.removeprefix(PART))
     file = SdfModel(path, element, read.version, link)
     model = imported(file, root=root, scale=scale, packages=packages, visual_error=visual_error)
     bodies = [
@@ -59,9 +60,12 @@ def import_sdf(
 
 
 class SdfModel:
-    """One tree of a <model>: see `anysim_urdf.xml.ModelElements`. `fixed` tells whether its root stands still."""
+    """One tree of a <model>, or with `root` None all that are in it: see `anysim_urdf.xml.ModelElements`.
 
-    def __init__(self, path: Path, element: Any, version: tuple[int, int], root: str) -> None:
+    `fixed` tells whether its root stands still, `static` whether all of it does; no joint carries one of `roots`.
+    """
+
+    def __init__(self, path: Path, element: Any, version: tuple[int, int], root: str | None) -> None:
         self.path, self._version = path, version
         self.name: str = element.get("name")
         self.instead = "its <model> holds none"
@@ -71,7 +75,7 @@ class SdfModel:
         self._attached: dict[str, str] = {}
         self._links: dict[str, Any] = {}
         self._joints: dict[str, tuple[Any, str]] = {}
-        self._static = self._tied = False
+        self.static = self._tied = False
         self._collect(element, "")
         self.frames = Frames(str(path), self._frames)
         self.weightless = {
@@ -79,8 +83,15 @@ class SdfModel:
         }
         self.links = {name: self._link(name, link) for name, link in self._links.items()}
         self.joints = [self._joint(name, joint, scope) for name, (joint, scope) in self._joints.items()]
-        self.fixed = self._static or self._tied
-        self._choose(root)
+        self.fixed = self.static or self._tied
+        moved = {joint.child for joint in self.joints}
+        self.roots = [name for name in self.links if name not in moved]
+        if root is not None:
+            self._choose(root)
+
+    def names(self) -> list[str]:
+        """The frames in it, but for its own."""
+        return [name for name in self._frames if name != MODEL]
 
     def where(self, kind: str, name: str) -> str:
         """`joint 'wrist' (arm.sdf:48)`."""
@@ -90,7 +101,7 @@ class SdfModel:
 
     def _collect(self, model: Any, scope: str) -> None:
         """Links, joints and frames of a model and of those in it, by their names in the outermost."""
-        self._static = self._static or model.findtext("static", "").strip() in ("true", "1")
+        self.static = self.static or model.findtext("static", "").strip() in ("true", "1")
         links = [part.get("name") for part in model.findall("link") if part.get("name")]
         canonical = model.get("canonical_link") or next(iter(links), "")
         inner = [part.get("name") for part in model.findall("model") if part.get("name")]
@@ -146,8 +157,7 @@ class SdfModel:
         children: dict[str, list[str]] = {}
         for joint in self.joints:
             children.setdefault(joint.parent, []).append(joint.child)
-        moved = {joint.child for joint in self.joints}
-        roots = [name for name in self.links if name not in moved]
+        roots = self.roots
         if not root:
             if len(roots) > 1:
                 raise AssetError(
@@ -169,16 +179,16 @@ class SdfModel:
         self.links = {name: link for name, link in self.links.items() if name in kept}
         self.joints = [joint for joint in self.joints if joint.child in kept]
         self.name = root
-        self.fixed = self._static or (self._tied and root == WORLD)
+        self.fixed = self.static or (self._tied and root == WORLD)
 
     # ------------------------------------------------------------------ elements
 
     def _link(self, name: str, element: Any) -> LinkElement:
         inertial = element.find("inertial")
-        if inertial is None and not self._static:
+        if inertial is None and not self.static:
             text = "has no <inertial>; SDF gives it 1 kg and 1 kg m^2"
             self.unheld.append(ImportNote("info", self.where("link", name), text))
-        own = None if inertial is None and self._static else self._inertial(name, inertial)
+        own = None if inertial is None and self.static else self._inertial(name, inertial)
         shapes = {
             tag: tuple(s for part in element.findall(tag) if (s := self._shape(name, part)) is not None)
             for tag in ("visual", "collision")

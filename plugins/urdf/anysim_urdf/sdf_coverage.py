@@ -42,6 +42,49 @@ def _shapes(of: str) -> Iterator[Row]:
         yield Row(f"{of}/geometry/{shape}", _OUT, "", _NO_SHAPE)
 
 
+_WORLD = "world"
+WORLD_ROWS: tuple[Row, ...] = (
+    Row(_WORLD, _EXACT, "name"),
+    Row(f"{_WORLD}/model", _EXACT, "", "each of its trees is an object; a level plane at height 0 is the ground"),
+    Row(f"{_WORLD}/include", _EXACT),
+    Row(f"{_WORLD}/frame", _EXACT, "name attached_to"),
+    Row(f"{_WORLD}/frame/pose", _EXACT, "relative_to degrees rotation_format"),
+    Row(f"{_WORLD}/gravity", _EXACT),
+    Row(f"{_WORLD}/physics", _IDLE, "name default type"),
+    Row(f"{_WORLD}/physics/max_step_size", _EXACT),
+    *(Row(f"{_WORLD}/physics/{key}", _IDLE) for key in ("real_time_factor", "real_time_update_rate")),
+    Row(f"{_WORLD}/physics/max_contacts", _IDLE),
+    *(
+        Row(f"{_WORLD}/physics/{key}", _OUT, "", "solvers are the engine's")
+        for key in ("ode", "bullet", "simbody", "dart")
+    ),
+    Row(f"{_WORLD}/light", _EXACT, "name type"),
+    Row(f"{_WORLD}/light/pose", _EXACT, "relative_to degrees rotation_format"),
+    *(Row(f"{_WORLD}/light/{key}", _EXACT) for key in ("diffuse", "direction", "intensity", "light_on")),
+    Row(f"{_WORLD}/light/spot", _OUT, "", "lights are no cones"),
+    Row(f"{_WORLD}/light/attenuation", _OUT, "", "lights reach everywhere"),
+    Row(f"{_WORLD}/light/visualize", _IDLE),
+    Row(f"{_WORLD}/light/cast_shadows", _OUT, "", "the world's `scenery` has it"),
+    Row(f"{_WORLD}/light/specular", _OUT, "", "highlights are the materials'"),
+    Row(f"{_WORLD}/scene", _IDLE),
+    Row(f"{_WORLD}/scene/ambient", _EXACT),
+    Row(f"{_WORLD}/scene/background", _EXACT),
+    Row(f"{_WORLD}/scene/shadows", _EXACT),
+    *(Row(f"{_WORLD}/scene/{key}", _IDLE) for key in ("grid", "origin_visual")),
+    *(Row(f"{_WORLD}/scene/{key}", _OUT, "", "it is Gazebo's alone") for key in ("fog", "sky")),
+    Row(f"{_WORLD}/joint", _OUT, "", "models are not joined to each other"),
+    Row(f"{_WORLD}/gui", _IDLE),
+    *(
+        Row(f"{_WORLD}/{key}", _OUT, "", "it is Gazebo's alone")
+        for key in ("plugin", "audio", "actor", "road", "population", "state")
+    ),
+    *(
+        Row(f"{_WORLD}/{key}", _OUT, "", "there is no such field")
+        for key in ("wind", "magnetic_field", "atmosphere", "spherical_coordinates")
+    ),
+)
+"""Of a file that is a world: of one that is an asset, all this is left to the world that it is put into."""
+
 ROWS: tuple[Row, ...] = (
     Row("model", _EXACT, "name canonical_link placement_frame"),
     *_poses("model", "model/frame", _LINK, f"{_LINK}/inertial", f"{_LINK}/visual", f"{_LINK}/collision", _JOINT),
@@ -122,20 +165,24 @@ ROWS: tuple[Row, ...] = (
 )
 """An element that is not here is left out with a note, and so is an attribute."""
 
-_BY_PATH: Mapping[str, list[Row]] = {path: [r for r in ROWS if r.path == path] for path in {row.path for row in ROWS}}
+_ALL = (*ROWS, *WORLD_ROWS)
+_BY_PATH: Mapping[str, list[Row]] = {path: [r for r in _ALL if r.path == path] for path in {row.path for row in _ALL}}
 _EVERYWHERE = frozenset({"name", "version"})
 
 
 def rows() -> Iterator[tuple[str, str, Fate, str]]:
     """The table for readers: element, its attributes, what becomes of them, and how or why."""
-    for row in ROWS:
+    for row in _ALL:
         yield row.path, row.attributes, row.fate, row.text
 
 
 def notes_of(model: Any) -> list[ImportNote]:
-    """A note for each kind of element and attribute of a <model> that is there in vain, with how often and where."""
+    """A note for each kind of element and attribute of a <model> or <world> that is there in vain, how often and where.
+
+    Of a world these are what it says beside its models.
+    """
     found: dict[tuple[str, str], list[str]] = {}
-    for what, why, owner in _unread(model, "model", f"model '{model.get('name')}'"):
+    for what, why, owner in _unread(model, model.tag, f"{model.tag} '{model.get('name')}'"):
         found.setdefault((what, why), []).append(owner)
     return [
         ImportNote("dropped", what, f"{why} ({len(owners)}: {listing(dict.fromkeys(owners), 3)})")
@@ -151,6 +198,8 @@ def _unread(node: Any, path: str, owner: str) -> Iterator[tuple[str, str, str]]:
         if key not in _EVERYWHERE and (row is None or row.fate is Fate.LEFT_OUT):
             yield f"<{node.tag} {key}>", _left_out(row), owner
     for child in node:
+        if path == _WORLD and child.tag in ("model", "include"):
+            continue
         below = "model" if child.tag == "model" else f"{path}/{child.tag}"
         own = _BY_PATH.get(below, [])
         whole = next((row for row in own if not row.attributes), None)

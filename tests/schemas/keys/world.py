@@ -66,6 +66,9 @@ PATTERN = "world.objects.red.texture={pattern: noise}"
 MOUNT = "world.cameras.eye={mount: red, channels: []}"
 DOORS, WINDOWS = ", doors: [{wall: east}]", ", windows: [{wall: north}]"
 
+SCENE = "world.source=file:$FILES/scene.xml"
+PACKED_SDF = "world.source={file: 'file:$FILES/packed.sdf', packages: {toys: 'file:$FILES"
+
 ROWS: dict[str, Row] = {
     "WorldSpec.name": row("world.name=other"),
     "WorldSpec.terrain": row("world.terrain=none"),
@@ -215,6 +218,10 @@ ROWS: dict[str, Row] = {
     "SourceSpec.capsule": red("source={capsule: [0.03, 0.06]}", "world.objects.red.source={capsule: [0.03, 0.05]}"),
     "SourceSpec.mesh": red("source={mesh: 'file:$FILES/shapes/b.obj'}", MESH),
     "SourceSpec.asset": red("source={asset: 'file:$FILES/two_link.urdf'}"),
+    "WorldSpec.source": row("world.source=file:$FILES/scene.xml"),
+    "SceneSpec.file": row("world.source.file=file:$FILES/packed.sdf", error="no package 'toys'", given=SCENE),
+    "SceneSpec.packages": row(f"{PACKED_SDF}/others'}}}}", given=f"{PACKED_SDF}/shapes'}}}}"),
+    "SceneSpec.notes": row("world.source.notes=[]", given=SCENE),
     "SourceSpec.packages": red(f"{PACKED}/others'}}}}", f"world.objects.red.{PACKED}/shapes'}}}}"),
     "SourceSpec.procedural": red("source={procedural: hinge_box}", VALVE),
     "SourceSpec.params": red("source={procedural: valve, params: {damping: 0.7}}", VALVE),

@@ -1,8 +1,8 @@
 """An MJCF file as a compiled MuJoCo model, after looking where its references lead."""
 
 import warnings
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +10,12 @@ import mujoco
 
 from anysim.assets.bounded_files import bounded
 from anysim.assets.model import ImportNote
-from anysim.errors import AssetError, listing, suggest
+from anysim.assets.scene import PART
+from anysim.errors import AssetError
 from anysim_mujoco.log import silence
 from anysim_mujoco.mjcf import unheld
 from anysim_mujoco.mjcf.budget import MjcfBudget
+from anysim_mujoco.mjcf.part import keep, scene_part
 from anysim_schemas.limits import MODEL_BYTES
 
 
@@ -26,6 +28,25 @@ def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | N
 
     Raises:
         AssetError: a missing file, a reference that leaves `root`, no such body, or what MuJoCo says against the file.
+    """
+    with opened(path, root) as file:
+        spec, said = file
+        if body.startswith(PART) and spec.body(body) is None:
+            said = scene_part(spec, path, body.removeprefix(PART))
+        else:
+            said += [] if not body else keep(spec, path, body)
+            said += unheld.late(spec)
+        if notes is not None:
+            notes += said
+        return compile_noting(spec, notes)
+
+
+@contextmanager
+def opened(path: Path, root: Path) -> Iterator[tuple[Any, list[ImportNote]]]:
+    """A parsed file without textures and skins, and notes of what is taken out; what MuJoCo says becomes an AssetError.
+
+    Raises:
+        AssetError: see `compiled`.
     """
     silence()  # MuJoCo logs each NaN of a file; where one matters, the World refuses it
     path, root = path.resolve(), root.resolve()
@@ -43,43 +64,19 @@ def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | N
         for material in spec.materials:
             material.textures = [""] * len(material.textures)
         spec.compiler.fusestatic = False
-        if body:
-            left_out = _keep(spec, path, body)
-            said += left_out
-        if notes is not None:
-            notes += [*said, *unheld.late(spec)]
-        with warnings.catch_warnings(record=True) as warned:
-            warnings.simplefilter("always")
-            model = spec.compile()
-        if notes is not None:
-            notes += [ImportNote("info", "MuJoCo", f"warns: {' '.join(str(one.message).split())}") for one in warned]
-        return model
+        yield spec, said
     except (ValueError, mujoco.FatalError) as error:
         raise AssetError(f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error
 
 
-def _keep(spec: Any, path: Path, body: str) -> list[ImportNote]:
-    """Take all bodies of the world out but one. MuJoCo removes what refers to them, and shortens keyframes."""
-    others = [one for one in spec.worldbody.bodies if one.name != body]
-    if len(others) == len(spec.worldbody.bodies):
-        names = [one.name for one in others if one.name]
-        raise AssetError(f"{path}: its world has no body '{body}'{suggest(body, names)} (bodies: {listing(names)})")
-    for looking in (*spec.cameras, *spec.lights):  # maybe at a body that goes; the importer leaves them behind anyway
-        spec.delete(looking)
-    rest = spec.copy()
-    rest.delete(rest.body(body))
-    whole = _ties(spec)
-    for one in others:
-        spec.delete(one)
-    return [
-        ImportNote("dropped", body, f"{kind} between it and other bodies of the file are left out ({count})")
-        for kind, count in (whole - _ties(rest) - _ties(spec)).items()
-    ]
-
-
-def _ties(spec: Any) -> Counter[str]:
-    """How many elements there are that may tie one body to another."""
-    return Counter({"equalities": len(spec.equalities), "tendons": len(spec.tendons)})
+def compile_noting(spec: Any, notes: list[ImportNote] | None = None) -> Any:
+    """The compiled model; `notes` gets what MuJoCo warns of."""
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        model = spec.compile()
+    if notes is not None:
+        notes += [ImportNote("info", "MuJoCo", f"warns: {' '.join(str(one.message).split())}") for one in warned]
+    return model
 
 
 def _parsed(path: Path, included: Mapping[str, bytes]) -> Any:

@@ -25,6 +25,7 @@ import numpy as np
 from anysim import cache
 from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote
+from anysim.assets.scene import PART
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.kinematics import inertia
@@ -37,6 +38,7 @@ from anysim_mujoco.mjcf.drives import drive_hint, left_out, shared
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
 from anysim_mujoco.mjcf.pairs import PairReader
+from anysim_mujoco.mjcf.part import unqualified
 from anysim_mujoco.mjcf.unheld import mixed, of_tendons
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -55,7 +57,8 @@ def import_mjcf(
         AssetError: a missing or damaged file, a reference that leaves `root`, something the neutral model cannot say.
     """
     notes: list[ImportNote] = []
-    return _MjcfImport(compiled(path, root, body, notes), path, scale, visual_error, notes).run()
+    model = _MjcfImport(compiled(path, root, body, notes), path, scale, visual_error, notes)
+    return unqualified(model.run(body), body[1:]) if body.startswith(PART) else model.run()
 
 
 class _MjcfImport:
@@ -76,9 +79,9 @@ class _MjcfImport:
         source = cache.digest(path.read_bytes(), model.mesh_vert.tobytes(), model.mesh_face.tobytes())
         self.geometry = GeomReader(model, source, scale, visual_error, self.notes)
 
-    def run(self) -> ImportedModel:
+    def run(self, part: str = "") -> ImportedModel:
         self._refuse_the_unsayable()
-        top = self._top()
+        top = 0 if part == PART else self._top(bool(part))
         for number in range(top, self.model.nbody):
             self._body(number, top)
         self._sites()
@@ -117,13 +120,15 @@ class _MjcfImport:
             raise AssetError(f"{self.path}: holds {model.nflex} flexes; the neutral model has rigid bodies")
         self.notes += of_tendons(model)
 
-    def _top(self) -> int:
+    def _top(self, part: bool) -> int:
         model = self.model
         tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
         if len(tops) != 1:
             names = listing([self.links[i] for i in tops], 6)
             say = f"; name the one that is meant: {self.path.name}#{self.links[tops[0]]}" if tops else ""
             raise AssetError(f"{self.path}: an asset has exactly one body in its world; this one has {names}{say}")
+        if part:
+            return tops[0]
         if model.body_geomnum[0]:
             self._note("dropped", "world", f"{model.body_geomnum[0]} geoms of the world beside the model are left out")
         if sites := int((model.site_bodyid == 0).sum()):
@@ -216,7 +221,7 @@ class _MjcfImport:
         model, taken = self.model, {*self.links, *(body.name for body in self.bodies)}
         for s, given in enumerate(_named([model.site(s).name for s in range(model.nsite)], "site")):
             number = int(model.site_bodyid[s])
-            if number == 0:
+            if number not in self.frames:
                 continue
             body, frame = self.frames[number]
             name = given if given not in taken else _free(f"{self.links[number]}.{given}", taken)

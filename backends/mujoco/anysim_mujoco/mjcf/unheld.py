@@ -49,6 +49,9 @@ _CONDIM = {
     6: "rolling friction is not simulated on every engine",
 }
 _SPATIAL = ", which is left out: they are paths through space, and tendons here are sums of joint positions"
+OF_SCENE = tuple("option texture skin material camera light sensor pair key numeric text tuple plugin".split())
+WORLD_OPTIONS = ("timestep", "gravity", "cone", "impratio")
+"""What of a file's options the `physics` of a world of it has."""
 _EARLY = ("texture", "skin", "material", "camera", "light")
 
 
@@ -61,6 +64,18 @@ def late(spec: mujoco.MjSpec) -> list[ImportNote]:
     """Notes of all others, and of the options."""
     kinds = [kind for kind in (*FIELDS, *WHOLE) if kind not in (*_EARLY, "option")]
     return [*_options(spec), *(note for kind in kinds for note in _of_kind(spec, kind))]
+
+
+def of_part(spec: mujoco.MjSpec, world: bool) -> list[ImportNote]:
+    """Notes of one part of a scene; with `world` also of what is fixed to the world."""
+    kinds = [kind for kind in (*FIELDS, *WHOLE) if kind not in OF_SCENE]
+    return [note for kind in dict.fromkeys(kinds) for note in _of_kind(spec, kind, world)]
+
+
+def of_scene(spec: mujoco.MjSpec) -> list[ImportNote]:
+    """Notes of what a file says of the whole scene, but for those of `early`."""
+    kinds = [kind for kind in OF_SCENE if kind not in ("option", *_EARLY)]
+    return [*_options(spec, WORLD_OPTIONS), *(note for kind in kinds for note in _of_kind(spec, kind))]
 
 
 def fields_of(element: Any) -> list[str]:
@@ -78,9 +93,9 @@ def pristine(kind: str) -> Any:
     return getattr(spec, f"add_{kind}")()
 
 
-def _of_kind(spec: mujoco.MjSpec, kind: str) -> Iterator[ImportNote]:
+def _of_kind(spec: mujoco.MjSpec, kind: str, world: bool = False) -> Iterator[ImportNote]:
     plural = {"body": "bodies", "mesh": "meshes", "equality": "equalities"}.get(kind, f"{kind}s")
-    elements = [one for one in getattr(spec, plural) if not _of_the_world(kind, one)]
+    elements = [one for one in getattr(spec, plural) if (world and kind != "body") or not _of_the_world(kind, one)]
     if not elements:
         return
     if kind in WHOLE and (row := whole(kind)) is not None:
@@ -119,9 +134,9 @@ def _of_free_joints(joints: Iterable[Any]) -> Iterator[ImportNote]:
             yield ImportNote("dropped", f"joint {field}", _named(ones, "a free joint has none here"))
 
 
-def _options(spec: mujoco.MjSpec) -> Iterator[ImportNote]:
+def _options(spec: mujoco.MjSpec, held: Iterable[str] = ()) -> Iterator[ImportNote]:
     fresh, own = mujoco.MjSpec().option, spec.option
-    for field in fields_of(fresh):
+    for field in (one for one in fields_of(fresh) if one not in held):
         value = value_of(own, field)
         if value == value_of(fresh, field):
             continue
