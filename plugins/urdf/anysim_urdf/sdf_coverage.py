@@ -91,7 +91,12 @@ ROWS: tuple[Row, ...] = (
     Row(f"{_LINK}/collision/density", _OUT, "", "masses are not computed of shapes"),
     *(Row(f"{_LINK}/collision/{key}", _IDLE) for key in ("max_contacts", "laser_retro")),
     Row(_JOINT, _EXACT, "name"),
-    Row(_JOINT, _ABOUT, "type", "fixed, revolute, continuous and prismatic; others are refused"),
+    Row(
+        _JOINT,
+        _ABOUT,
+        "type",
+        "ball joints become chains of joints of one axis; universal, screw and others are refused",
+    ),
     Row(f"{_JOINT}/parent", _EXACT),
     Row(f"{_JOINT}/child", _EXACT),
     Row(f"{_JOINT}/axis", _EXACT),

@@ -116,7 +116,7 @@ def test_a_world_of_includes_and_nested_models(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "ball": (ARM.replace('"revolute"', '"ball"'), "is of type 'ball'"),
+    "screw": (ARM.replace('"revolute"', '"screw"'), "is of type 'screw'"),
     "number": (ARM.replace("<mass>2", "<mass>two"), r"arm.sdf:2: <mass> is 'two'; expected 1 finite numbers"),
     "frame": (ARM.replace('relative_to="mount"', 'relative_to="mont"'), "no frame 'mont'; did you mean 'mount'"),
     "cycle": (ARM.replace('name="mount">', 'name="mount" attached_to="upper">'), "is relative to itself"),
