@@ -2,11 +2,11 @@
 
     python benchmarks/drafts.py [NAME=FOLDER...] [--json docs/drafts.json] [--only WORD]
 
-Without folders: the URDF files of pybullet_data and example-robot-data, and the robots of mani_skill and robosuite where
-those are installed. Each file goes the way of `anysim robot import FILE`: a draft, which is then qualified on each
-engine in a process of its own, with 2 s of holding. Goes on where it was stopped: what the JSON has is kept, unless
-`--again` is given; `--engines none` imports and drafts all of them first, which takes minutes where engines take an hour. `NAME=FOLDER` gives a package that is not installed. What writes the table from the JSON is
-`scripts/importing_table.py`.
+Without folders: the URDF files of pybullet_data and example-robot-data, and the robots of mani_skill and robosuite
+where those are installed. Each file goes the way of `anysim robot import FILE`: a draft, which is then qualified on
+each engine in a process of its own, with 2 s of holding. It goes on where it was stopped: what the JSON has is kept,
+unless `--again` is given. `--engines none` imports and drafts alone, which takes minutes where engines take an hour.
+`NAME=FOLDER` gives a package that is not installed. `scripts/importing_table.py` writes the table from the JSON.
 """
 
 import argparse
@@ -35,6 +35,8 @@ LIMIT = 240.0
 """[s] of wall-clock time for one file on all engines."""
 PACKAGES = {"pybullet": "pybullet_data", "mani_skill": "mani_skill", "robosuite": "robosuite"}
 """Distributions, and the Python packages that hold their files."""
+LOADED = ("pinocchio", "lxml.etree", "trimesh", "scipy.spatial", "yourdfpy", "mujoco", "anysim_mujoco.mjcf")
+"""What readers and engines import when they need it, which each process would do anew; and the engines themselves."""
 PATTERNS = {
     "pybullet": ("**/*.urdf",),
     "example-robot-data": ("**/*.urdf",),
@@ -164,8 +166,9 @@ def main() -> int:
     options = parser.parse_args()
     stored = json.loads(options.json.read_text("utf-8")) if options.json.is_file() else {"versions": {}, "files": {}}
     wanted = [] if options.engines == "none" else options.engines.split(",")
-    for engine in wanted:  # once, before the processes begin
-        import_module(f"anysim_{engine}")
+    for module in (*LOADED, *wanted):  # once, before the processes begin
+        if find_spec(module) is not None:
+            import_module(module)
     for name, (folder, version) in folders(options.folders).items():
         stored["versions"][name] = version or stored["versions"].get(name, "")
         for file in files(name, folder):
