@@ -253,3 +253,29 @@ def test_a_gripper_begins_at_an_end_and_a_hand_where_it_is(tmp_path: Path, finge
     world = built(made, tmp_path)
     assert next(iter(load_robot(str(tmp_path / "hand.yaml")).spec.channels["eef"].controllers)) == first
     assert {joint.initial for joint in world.joints} == ({-0.01} if fingers == 2 else {0.0})
+
+
+@pytest.mark.parametrize(
+    ("kind", "base", "channels"), [("planar", "fixed", {"base", "arm"}), ("floating", "floating", {"arm"})]
+)
+def test_roots_of_a_urdf_that_move(tmp_path: Path, kind: str, base: str, channels: set[str]) -> None:
+    """A planar joint carries it, and its three are the channel of the base; a floating one is no joint at all."""
+    part = (
+        '<link name="{0}"><inertial><mass value="2"/><inertia ixx=".1" iyy=".1" izz=".1"/></inertial>'
+        '<collision><geometry><box size=".4 .4 .2"/></geometry></collision></link>'
+    )
+    (tmp_path / "cart.urdf").write_text(
+        f'<robot name="c"><link name="world"/>{part.format("body")}{part.format("arm")}'
+        f'<joint name="move" type="{kind}"><parent link="world"/><child link="body"/><axis xyz="0 0 1"/></joint>'
+        '<joint name="lift" type="revolute"><parent link="body"/><child link="arm"/><axis xyz="0 1 0"/>'
+        '<limit lower="-1" upper="1" effort="20" velocity="2"/></joint></robot>'
+    )
+    made = draft(tmp_path / "cart.urdf")
+    world = built(made, tmp_path)
+    spec = load_robot(str(tmp_path / "cart.yaml")).spec
+    assert (spec.base, set(spec.channels)) == (base, channels)
+    assert len(world.actuators) == (4 if kind == "planar" else 1)
+    if kind == "planar":
+        assert spec.channels["base"].joints == ("move.x", "move.y", "move.yaw")
+        told = "base: fixed; move.x, move.y, move.yaw between an empty root and its first body carry it"
+        assert told in made.guess.reasons

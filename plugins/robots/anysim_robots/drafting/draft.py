@@ -89,7 +89,7 @@ class Draft(NamedTuple):
     def _channels(self) -> list[str]:
         g = self.guess
         legs = tuple(dict.fromkeys(joint for leg in g.legs for joint in leg.joints))
-        base = legs + tuple(wheel for wheel in g.wheels if wheel not in legs)
+        base = g.carried or legs + tuple(wheel for wheel in g.wheels if wheel not in legs)
         channels = {"base": base, "arm": g.arm, "eef": g.eef}
         if not any(channels.values()):
             return ["channels: {}"]
