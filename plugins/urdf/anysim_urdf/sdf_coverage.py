@@ -44,8 +44,10 @@ def _shapes(of: str) -> Iterator[Row]:
 
 ROWS: tuple[Row, ...] = (
     Row("model", _EXACT, "name canonical_link placement_frame"),
-    *_poses("model", "model/frame", _LINK, f"{_LINK}/inertial", f"{_LINK}/visual", f"{_LINK}/collision", _JOINT),
+    *_poses("model", "model/frame", _LINK, f"{_LINK}/visual", f"{_LINK}/collision", _JOINT),
     *_poses("model/include"),
+    Row(f"{_LINK}/inertial/pose", _EXACT, "degrees rotation_format"),
+    Row(f"{_LINK}/inertial/pose", _NOT, "relative_to", "it is relative to its link alone"),
     Row("model/static", _EXACT),
     Row("model/frame", _EXACT, "name attached_to"),
     Row("model/include", _EXACT, "", "a file of a package, or of the file's own folder"),
