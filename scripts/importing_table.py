@@ -90,7 +90,7 @@ def _failed(row: dict[str, Any]) -> dict[str, str]:
 
 def cell(words: str, longest: int = 200) -> str:
     """Words that do not break a table."""
-    line = " ".join(words.split()).replace("|", "/")
+    line = " ".join(words.split()).replace("|", "/").replace("<", "&lt;")
     return line if len(line) <= longest else f"{line[: longest - 1]}…"
 
 
