@@ -2,13 +2,15 @@
 
     python scripts/importing_table.py [--check]
 
-The figures of the models are those of docs/models.json, which `python benchmarks/models.py FOLDER... --json` writes.
-`--check` writes nothing and exits with 1 if the page has drifted from the code.
+The figures of the models are those of docs/models.json, which `python benchmarks/models.py FOLDER... --json` writes,
+those of drafts of docs/drafts.json, which `python benchmarks/drafts.py` writes. `--check` writes nothing and exits with
+1 if the page has drifted from the code.
 """
 
 import json
 import sys
 from collections.abc import Callable, Iterable
+from typing import Any
 
 from generated import ROOT, main
 
@@ -39,9 +41,62 @@ def models() -> str:
     return "\n".join(lines)
 
 
+ENGINES = ("mujoco", "pybullet", "sapien")
+
+
+def drafts() -> str:
+    """The robots of packages that were drafted: how many of each package import, build, pass the audit and hold."""
+    stored = json.loads((ROOT / "docs/drafts.json").read_text("utf-8"))
+    by_package: dict[str, list[dict[str, Any]]] = {}
+    for uri, row in stored["files"].items():
+        by_package.setdefault(package_of(uri), []).append(row)
+    columns = [f"{engine}: {what}" for engine in ENGINES for what in ("built", "audited", "held")]
+    lines = ["| package | files | imported | tried | " + " | ".join(columns) + " |", "|---" * (4 + len(columns)) + "|"]
+    for package, rows in sorted(by_package.items()):
+        read = [row for row in rows if "refused" not in row]
+        tried = [row for row in read if all(engine in row["engines"] for engine in ENGINES)]
+        passed = [
+            sum(check in row["engines"][engine].get("passed", ()) for row in tried)
+            for engine in ENGINES
+            for check in ("build", "audit", "hold")
+        ]
+        version = stored["versions"].get(package, "")
+        cells = [f"{package} {version}".strip(), len(rows), len(read), len(tried), *passed]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    lines += ["", "Refused, with the reason:", "", "| file | why |", "|---|---|"]
+    lines += [f"| `{u}` | {cell(row['refused'])} |" for u, row in stored["files"].items() if "refused" in row]
+    lines += ["", "Imported, and something did not pass:", "", "| file | engine | what, and why |", "|---|---|---|"]
+    for uri, row in stored["files"].items():
+        lines += [f"| `{uri}` | {engines} | {why} |" for why, engines in _failed(row).items()]
+    return "\n".join(lines)
+
+
+def package_of(uri: str) -> str:
+    """The distribution that a file of the drafts comes with."""
+    scheme, _, rest = uri.partition(":")
+    return scheme if scheme != "package" else rest.partition("/")[0].removesuffix("_data")
+
+
+def _failed(row: dict[str, Any]) -> dict[str, str]:
+    """By reason the engines that have it."""
+    found: dict[str, list[str]] = {}
+    for engine, one in row.get("engines", {}).items():
+        for check, why in one["why"].items():
+            figure = f" {one['moved']:g}" if check == "hold" and "moved" in one else ""
+            words = cell(why)
+            found.setdefault(f"**{check}**{figure if len(row['engines']) == 1 else ''}: {words}", []).append(engine)
+    return {why: ", ".join(engines) for why, engines in found.items()}
+
+
+def cell(words: str, longest: int = 200) -> str:
+    """Words that do not break a table."""
+    line = " ".join(words.split()).replace("|", "/").replace("<", "&lt;")
+    return line if len(line) <= longest else f"{line[: longest - 1]}…"
+
+
 if __name__ == "__main__":
     tables = {"URDF": urdf.rows, "SDF": sdf.rows, "MJCF": mjcf.rows}
     contents: dict[str, Callable[[], str]] = {name: lambda rows=rows: table(rows()) for name, rows in tables.items()}
-    contents["models"] = models
+    contents |= {"models": models, "drafts": drafts}
     page = ("docs/importing.md",)
     sys.exit(max(main(__doc__, name, "importing_table.py", page, content) for name, content in contents.items()))

@@ -38,6 +38,10 @@ Folders = dict[str, list[tuple[Path, Path]]]
 """Of packages by name: what no file of it may leave, and a folder where it may lie."""
 
 
+class MissingReferenceError(AssetError):
+    """What a file refers to lies nowhere, and the folder or package that would hold it is there."""
+
+
 class AssetFile(NamedTuple):
     """An existing file, and the folder that no reference inside it may leave. Both are absolute and resolved."""
 
@@ -163,10 +167,15 @@ def resolve_reference(
                 return resolved
             outside = resolved
     if outside is not None:
-        raise AssetError(f"{asked_by} refers to '{reference}', which leaves the asset's root {root}: it is {outside}")
+        raise AssetError(
+            f"{asked_by} refers to '{reference}', which leaves the asset's root {root}: it is {outside}; name the file "
+            "through a folder that holds both (package:NAME/…, or a YAML file there), or put a package.xml into it"
+        )
     places = listing(dict.fromkeys(str(candidate) for _, candidate in candidates), 4)
     near = _nearest(candidates[0][1], candidates[0][0])
-    raise AssetError(f"{asked_by} refers to '{reference}', which does not exist{near} (looked for: {places})")
+    raise MissingReferenceError(
+        f"{asked_by} refers to '{reference}', which does not exist{near} (looked for: {places})"
+    )
 
 
 def example_robot_data() -> Path:

@@ -67,7 +67,12 @@ ROWS: tuple[Row, ...] = (
         "PyBullet's surfaces and stiffness; the world's `contact` and `surfaces` have them",
     ),
     Row(_JOINT, _EXACT, "name"),
-    Row(_JOINT, _ABOUT, "type", "fixed, revolute, continuous and prismatic; planar, floating and others are refused"),
+    Row(
+        _JOINT,
+        _ABOUT,
+        "type",
+        "planar, floating and spherical ones become chains of joints of one axis; unknown ones are refused",
+    ),
     Row(f"{_JOINT}/origin", _EXACT, "xyz rpy"),
     Row(f"{_JOINT}/origin", _OUT, "quat_xyzw", "`rpy` is read"),
     Row(f"{_JOINT}/parent", _EXACT, "link"),

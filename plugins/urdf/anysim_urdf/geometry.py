@@ -9,7 +9,7 @@ import numpy as np
 from anysim.assets.bounded_files import check
 from anysim.assets.meshes import collision_mesh, visual_parts
 from anysim.assets.model import ImportNote
-from anysim.assets.uri import Folders, resolve_reference
+from anysim.assets.uri import Folders, MissingReferenceError, resolve_reference
 from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
@@ -66,7 +66,11 @@ class GeometryReader:
             shape = self._primitive(visual)
             self._add(link, Geom(name, body, shape, position, quaternion, visual.color or _GREY, collides=False))
             return
-        path = self._path(link, visual)
+        try:
+            path = self._path(link, visual)
+        except MissingReferenceError as error:
+            self._note("dropped", link, f"is not fully shown: {str(error).partition(' refers to ')[2]}")
+            return
         try:
             parts = visual_parts(path, self._mesh_scale(visual), error=self._visual_error)
         except AssetError as error:  # the file is there; what cannot be read of it is only not seen

@@ -10,7 +10,8 @@ Rules where a source leaves room or is wrong; each use is a note in the report:
   cannot be simulated: its joint is frozen at zero (or the nearest limit) and it is lumped. A source in which no moving
   link has a mass is refused.
 - A joint that follows a follower follows its leader directly; one that follows a frozen joint is frozen too.
-- Axes are normalised. Planar, floating and unknown joints, several roots, loops and duplicate names are refused.
+- Axes are normalised. A joint of several axes becomes a chain (`anysim_urdf.several_axes`). Unknown joints, several
+  roots, loops and duplicate names are refused.
 """
 
 from collections.abc import Mapping
@@ -32,6 +33,7 @@ from anysim.math import matrix as M, pose as P
 from anysim.model.hash import split, tidy
 from anysim.model.world import FAR, Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
 from anysim_urdf.geometry import GeometryReader
+from anysim_urdf.several_axes import KINDS, unfolded
 from anysim_urdf.xml import InertialElement, JointElement, ModelElements, UrdfFile
 
 _LIMIT_SLACK = 1e-3  # [rad] or [m] that limits of followers and leaders may differ by, from rounding
@@ -76,8 +78,10 @@ class _UrdfImport:
         self, file: ModelElements, root: Path, scale: float, packages: Mapping[str, Path], visual_error: float
     ) -> None:
         self.file, self.scale = file, scale
-        self.notes: list[ImportNote] = [*file.unheld]
-        self.links = file.links
+        whole = unfolded(file)
+        self.notes: list[ImportNote] = [*file.unheld, *whole.notes]
+        self.links, self.elements = whole.links, whole.joints
+        self.kind = BodyKind.FREE if whole.floats else BodyKind.STATIC
         self.children: dict[str, list[JointElement]] = {name: [] for name in self.links}
         self.base = self._structure()
         self.geometry = GeometryReader(file, root, scale, packages, visual_error, self.notes)
@@ -89,7 +93,7 @@ class _UrdfImport:
 
     def run(self) -> ImportedModel:
         self.frozen = self._frozen()
-        self._add_body(self.base, Body(self.base, BodyKind.STATIC))
+        self._add_body(self.base, Body(self.base, self.kind))
         stack = [(joint, 0, _IDENTITY) for joint in reversed(self.children[self.base])]
         while stack:
             joint, parent, frame = stack.pop()
@@ -125,7 +129,7 @@ class _UrdfImport:
         if not self.links:
             raise AssetError(f"{self.file.path}: has no links: {self.file.instead}")
         parent: dict[str, str] = {}
-        for joint in self.file.joints:
+        for joint in self.elements:
             here = self.file.where("joint", joint.name)
             for name in (joint.parent, joint.child):
                 if name not in self.links:
@@ -134,7 +138,7 @@ class _UrdfImport:
                 raise AssetError(f"{here}: the link '{joint.child}' has two parents; closed loops are not supported")
             if joint.type != "fixed" and joint.type not in _TYPES:
                 raise AssetError(
-                    f"{here} is of type '{joint.type}'; the neutral model has fixed, revolute, continuous and prismatic"
+                    f"{here} is of type '{joint.type}'; known are fixed, {', '.join(_TYPES)}, {', '.join(KINDS)}"
                 )
             parent[joint.child] = joint.name
             self.children[joint.parent].append(joint)
@@ -165,7 +169,7 @@ class _UrdfImport:
             own = self.links[name].inertial
             mass[name] = max(0.0, own.mass) if own is not None else 0.0
             mass[name] += sum(mass[joint.child] for joint in self.children[name])
-        moving = [joint for joint in self.file.joints if joint.type != "fixed"]
+        moving = [joint for joint in self.elements if joint.type != "fixed"]
         frozen = {joint.name for joint in moving if mass[joint.child] <= 0}
         if moving and len(frozen) == len(moving):
             raise AssetError(f"{self.file.path}: no link that moves has a mass; add <inertial> elements to simulate it")
@@ -200,7 +204,7 @@ class _UrdfImport:
         return current, multiplier, offset
 
     def _mimic(self) -> None:
-        by_name = {joint.name: joint for joint in self.file.joints if joint.type != "fixed"}
+        by_name = {joint.name: joint for joint in self.elements if joint.type != "fixed"}
         number = {joint.name: i for i, joint in enumerate(self.joints)}
         for i, joint in enumerate(self.joints):
             leader, multiplier, offset = self._leader(by_name[joint.name], by_name)

@@ -95,7 +95,8 @@ class SdfModel:
 
     def where(self, kind: str, name: str) -> str:
         """`joint 'wrist' (arm.sdf:48)`."""
-        return f"{kind} '{name}' ({self.path.name}:{self._lines.get((kind, name), 0)})"
+        line = self._lines.get((kind, name))
+        return f"{kind} '{name}' ({self.path.name}{'' if line is None else f':{line}'})"
 
     # ------------------------------------------------------------------ names and frames
 

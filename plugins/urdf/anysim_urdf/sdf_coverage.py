@@ -87,8 +87,10 @@ WORLD_ROWS: tuple[Row, ...] = (
 
 ROWS: tuple[Row, ...] = (
     Row("model", _EXACT, "name canonical_link placement_frame"),
-    *_poses("model", "model/frame", _LINK, f"{_LINK}/inertial", f"{_LINK}/visual", f"{_LINK}/collision", _JOINT),
+    *_poses("model", "model/frame", _LINK, f"{_LINK}/visual", f"{_LINK}/collision", _JOINT),
     *_poses("model/include"),
+    Row(f"{_LINK}/inertial/pose", _EXACT, "degrees rotation_format"),
+    Row(f"{_LINK}/inertial/pose", _NOT, "relative_to", "it is relative to its link alone"),
     Row("model/static", _EXACT),
     Row("model/frame", _EXACT, "name attached_to"),
     Row("model/include", _EXACT, "", "a file of a package, or of the file's own folder"),
@@ -134,7 +136,12 @@ ROWS: tuple[Row, ...] = (
     Row(f"{_LINK}/collision/density", _OUT, "", "masses are not computed of shapes"),
     *(Row(f"{_LINK}/collision/{key}", _IDLE) for key in ("max_contacts", "laser_retro")),
     Row(_JOINT, _EXACT, "name"),
-    Row(_JOINT, _ABOUT, "type", "fixed, revolute, continuous and prismatic; others are refused"),
+    Row(
+        _JOINT,
+        _ABOUT,
+        "type",
+        "ball joints become chains of joints of one axis; universal, screw and others are refused",
+    ),
     Row(f"{_JOINT}/parent", _EXACT),
     Row(f"{_JOINT}/child", _EXACT),
     Row(f"{_JOINT}/axis", _EXACT),

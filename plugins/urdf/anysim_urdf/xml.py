@@ -127,7 +127,8 @@ class UrdfFile:
 
     def where(self, kind: str, name: str) -> str:
         """`joint 'wrist' (arm.urdf:48)`."""
-        return f"{kind} '{name}' ({self.path.name}:{self._lines.get((kind, name), 0)})"
+        line = self._lines.get((kind, name))
+        return f"{kind} '{name}' ({self.path.name}{'' if line is None else f':{line}'})"
 
     # ------------------------------------------------------------------ the file
 
@@ -156,7 +157,10 @@ class UrdfFile:
     # ------------------------------------------------------------------ elements
 
     def _link(self, element: Any) -> LinkElement:
-        shapes = {tag: tuple(self._shape(part) for part in element.findall(tag)) for tag in ("visual", "collision")}
+        shapes = {
+            tag: tuple(s for part in element.findall(tag) if (s := self._shape(part)) is not None)
+            for tag in ("visual", "collision")
+        }
         inertial = element.find("inertial")
         own = None if inertial is None else self._inertial(inertial)
         return LinkElement(element.get("name"), own, shapes["visual"], shapes["collision"])
@@ -170,7 +174,7 @@ class UrdfFile:
         weight = 0.0 if mass is None else self._number(mass, "value", None)
         return InertialElement(weight, self._origin(element), matrix)
 
-    def _shape(self, element: Any) -> Shape:
+    def _shape(self, element: Any) -> Shape | None:
         geometry = element.find("geometry")
         if geometry is None or len(geometry) == 0:
             raise self._error(element, f"a <{element.tag}> of {self._owner(element)} has no geometry")
@@ -185,6 +189,10 @@ class UrdfFile:
         else:
             keys = ("radius", "length") if shape.tag in ("cylinder", "capsule") else ("radius",)
             size = tuple(self._number(shape, key, None) for key in keys)
+        if shape.tag != "mesh" and (not any(size) or (shape.tag != "box" and size[0] == 0.0)):
+            where = self.where("link", element.getparent().get("name"))
+            self.unheld.append(ImportNote("dropped", where, f"has a <{shape.tag}> of size 0, which nothing can touch"))
+            return None
         if 0.0 in size or (min(size) < 0 and shape.tag != "mesh"):  # a negative scale of a mesh mirrors
             raise self._error(shape, f"<{shape.tag}> of {self._owner(element)} has the size {list(size)}")
         filename = shape.get("filename") or ""

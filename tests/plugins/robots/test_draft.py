@@ -9,7 +9,9 @@ import pytest
 from anysim.api import compile_world, load
 from anysim.assets.catalogue import load_robot
 from anysim.assets.uri import example_robot_data
+from anysim.conventions import Array
 from anysim.errors import AssetError
+from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_robots.drafting.draft import draft
 from anysim_robots.drafting.gains import BANDWIDTH
@@ -204,3 +206,76 @@ def test_chains_at_the_corners_are_legs_and_not_fingers(tmp_path: Path, chains: 
     row = [(0.1, 0.03 * i) for i in range(3)] + [(-0.1, 0.0)]
     (tmp_path / "hand.xml").write_text(text.format("".join(leg.format(*place) for place in row)))
     assert draft(tmp_path / "hand.xml").guess.category == "hand"
+
+
+def test_bent_legs_are_put_below_their_hips(tmp_path: Path) -> None:
+    """Knees that cannot be straight leave the feet behind; the thighs bring them back, which is said."""
+    leg = (
+        '<body pos="{0} {1} 0"><joint name="hip{2}" axis="1 0 0" range="-40 40"/><inertial pos="0 0 0" mass=".2" '
+        'diaginertia=".001 .001 .001"/><body><joint name="thigh{2}" axis="0 1 0" range="-60 200"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 -.2" size=".02"/><body name="calf{2}" pos="0 0 -.2">'
+        '<joint name="knee{2}" axis="0 1 0" range="-150 -50"/><geom type="capsule" fromto="0 0 0 0 0 -.2" size=".02"/>'
+        '<body name="foot{2}" pos="0 0 -.2"><geom size=".02"/></body></body></body></body>'
+    )
+    legs = "".join(leg.format(x, y, i) for i, (x, y) in enumerate((x, y) for x in (0.2, -0.2) for y in (0.1, -0.1)))
+    box = '<geom type="box" size="0.2 0.1 0.05" mass="8"/>'
+    (tmp_path / "dog.xml").write_text(f'<mujoco><worldbody><body name="b">{box}{legs}</body></worldbody></mujoco>')
+    made = draft(tmp_path / "dog.xml")
+    assert made.guess.reasons[-1] == "home: thigh0, thigh1, thigh2, thigh3 put the feet below them"
+    assert "# Guessed: home: thigh0" in made.text(tmp_path)
+    world = built(made, tmp_path)
+    height = 0.2 * 2 * np.cos(np.radians(25))  # both of a length, the knee at -50 degrees
+    assert made.guess.base_height == pytest.approx(height + 0.02, abs=2e-3)
+    poses = dict(zip((body.name for body in world.bodies), world.initial_body_pose, strict=True))
+    for i in range(4):
+        calf = poses[f"robot.calf{i}"]
+        foot = calf[:3] + P.rotate(calf[3:], np.array([0.0, 0.0, -0.2]))
+        assert foot[:2] == pytest.approx(_thigh(world, poses, i)[:2], abs=0.01)
+
+
+def _thigh(world: World, poses: dict[str, Array], i: int) -> Array:
+    joint = next(j for j in world.joints if j.name == f"robot.thigh{i}")
+    return poses[world.bodies[joint.body].name][:3]
+
+
+@pytest.mark.parametrize(("fingers", "first"), [(2, "gripper_binary"), (5, "joint_position")])
+def test_a_gripper_begins_at_an_end_and_a_hand_where_it_is(tmp_path: Path, fingers: int, first: str) -> None:
+    """What is asked of neither then moves nothing: one command of a gripper opens it or closes it."""
+    finger = (
+        '<body pos="0 {0} .1"><joint name="finger{1}" type="slide" axis="0 1 0" range="-.01 .04"/>'
+        '<geom size=".01"/></body>'
+    )
+    parts = "".join(finger.format(0.05 * i, i) for i in range(fingers))
+    (tmp_path / "hand.xml").write_text(
+        f'<mujoco><worldbody><body name="b"><geom size=".1"/>{parts}</body></worldbody></mujoco>'
+    )
+    made = draft(tmp_path / "hand.xml")
+    world = built(made, tmp_path)
+    assert next(iter(load_robot(str(tmp_path / "hand.yaml")).spec.channels["eef"].controllers)) == first
+    assert {joint.initial for joint in world.joints} == ({-0.01} if fingers == 2 else {0.0})
+
+
+@pytest.mark.parametrize(
+    ("kind", "base", "channels"), [("planar", "fixed", {"base", "arm"}), ("floating", "floating", {"arm"})]
+)
+def test_roots_of_a_urdf_that_move(tmp_path: Path, kind: str, base: str, channels: set[str]) -> None:
+    """A planar joint carries it, and its three are the channel of the base; a floating one is no joint at all."""
+    part = (
+        '<link name="{0}"><inertial><mass value="2"/><inertia ixx=".1" iyy=".1" izz=".1"/></inertial>'
+        '<collision><geometry><box size=".4 .4 .2"/></geometry></collision></link>'
+    )
+    (tmp_path / "cart.urdf").write_text(
+        f'<robot name="c"><link name="world"/>{part.format("body")}{part.format("arm")}'
+        f'<joint name="move" type="{kind}"><parent link="world"/><child link="body"/><axis xyz="0 0 1"/></joint>'
+        '<joint name="lift" type="revolute"><parent link="body"/><child link="arm"/><axis xyz="0 1 0"/>'
+        '<limit lower="-1" upper="1" effort="20" velocity="2"/></joint></robot>'
+    )
+    made = draft(tmp_path / "cart.urdf")
+    world = built(made, tmp_path)
+    spec = load_robot(str(tmp_path / "cart.yaml")).spec
+    assert (spec.base, set(spec.channels)) == (base, channels)
+    assert len(world.actuators) == (4 if kind == "planar" else 1)
+    if kind == "planar":
+        assert spec.channels["base"].joints == ("move.x", "move.y", "move.yaw")
+        told = "base: fixed; move.x, move.y, move.yaw between an empty root and its first body carry it"
+        assert told in made.guess.reasons

@@ -44,7 +44,11 @@ def test_a_draft_is_written_read_back_checked_and_drawn(tmp_path: Path) -> None:
     made = anysim("robot", "import", "new_arm.urdf", cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     assert "TODO license" in made.stdout
-    assert "audit on mujoco: audit: passed" in made.stdout
+    table = [line.split("\t") for line in made.stdout.splitlines() if "\t" in line]
+    assert table[0] == ["engine", "", "build", "source", "audit", "kinematics", "hold"]
+    assert [row[0].split()[0] for row in table[1:]] == ["mujoco", "pybullet", "sapien"]
+    assert all(row[1:] == ["qualified", "yes", "yes", "yes", "yes", "yes"] for row in table[1:]), made.stdout
+    assert "guessed base: fixed; it has neither legs nor wheels" in made.stdout
     again = anysim("robot", "import", "new_arm.urdf", cwd=tmp_path)
     assert again.returncode == 2
     assert "--force" in again.stderr
@@ -60,11 +64,31 @@ def test_a_draft_is_written_into_the_current_folder_and_not_beside_the_model(tmp
     theirs.mkdir()
     mine.mkdir()
     shutil.copy(ARM / "third_arm.urdf", theirs / "new_arm.urdf")
-    made = anysim("robot", "import", str(theirs / "new_arm.urdf"), "--json", cwd=mine)
+    made = anysim("robot", "import", str(theirs / "new_arm.urdf"), "--json", "--engine", "none", cwd=mine)
     assert made.returncode == 0, made.stderr
     assert json.loads(made.stdout)["file"] == "new_arm.yaml"
     assert [path.name for path in theirs.iterdir()] == ["new_arm.urdf"]
     assert f"source: {theirs / 'new_arm.urdf'}" in (mine / "new_arm.yaml").read_text()
+
+
+@pytest.mark.slow
+def test_a_draft_that_falls_over_is_written_and_ends_with_1(tmp_path: Path) -> None:
+    """Two wheels and no castor: it builds, and does not stay upright."""
+    wheel = (
+        '<body name="{0}" pos="0 {1} 0"><joint name="{0}_joint" axis="0 1 0"/>'
+        '<geom type="cylinder" size="0.1 0.02" euler="90 0 0" mass="1"/></body>'
+    )
+    sides = wheel.format("left_wheel", 0.2) + wheel.format("right_wheel", -0.2)
+    (tmp_path / "cart.xml").write_text(
+        '<mujoco><worldbody><body name="cart" pos="0 0 0.1"><freejoint/>'
+        f'<geom type="box" size="0.02 0.15 0.3" pos="0.05 0 0.3" mass="5"/>{sides}</body></worldbody></mujoco>'
+    )
+    made = anysim("robot", "import", "cart.xml", "--engine", "mujoco", "--hold", "1", cwd=tmp_path)
+    assert made.returncode == 1, made.stdout
+    assert "name: cart" in (tmp_path / "cart.yaml").read_text()
+    row = next(line for line in made.stdout.splitlines() if line.startswith("mujoco"))
+    assert row.split("\t")[1:3] + row.split("\t")[-1:] == ["failed", "yes", "no"]
+    assert "mujoco: hold: FAILED" in made.stdout
 
 
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -89,11 +113,11 @@ def test_a_package_that_is_elsewhere_can_be_named(elsewhere: Path) -> None:
     lost = anysim("robot", "import", "new_arm.urdf", cwd=elsewhere)
     assert lost.returncode == 2
     assert "--package nice_meshes=FOLDER" in lost.stderr
-    made = anysim("robot", "import", "new_arm.urdf", "--package", "nice_meshes=../far/away", "--json", cwd=elsewhere)
+    words = ("--package", "nice_meshes=../far/away", "--json", "--engine", "mujoco", "--hold", "0.1")
+    made = anysim("robot", "import", "new_arm.urdf", *words, cwd=elsewhere)
     assert made.returncode == 0, made.stderr
-    audits = json.loads(made.stdout)["audit"].values()
-    assert audits
-    assert all(words.startswith("audit: passed") for words in audits), audits
+    (tried,) = json.loads(made.stdout)["engines"].values()
+    assert {"build", "audit", "hold"} <= {check["name"] for check in tried["checks"] if check["passed"]}
     assert load_robot(str(elsewhere / "new_arm.yaml")).spec.packages == {
         "nice_meshes": str(elsewhere.parent / "far" / "away")
     }

@@ -105,3 +105,12 @@ def test_a_description_comes_from_the_cache_and_never_from_a_network(
     assert 'source: "robot_descriptions:two_description"' in made.text(tmp_path)
     for name in [name for name in sys.modules if name.partition(".")[0] == "robot_descriptions"]:
         del sys.modules[name]
+
+
+def test_a_uri_names_a_file_of_a_package_and_stays_in_the_draft(tmp_path: Path) -> None:
+    """The whole package is then what references may not leave."""
+    made = draft("example-robot-data:z1_description/urdf/z1.urdf")
+    assert made.name == "z1"
+    assert 'source: "example-robot-data:z1_description/urdf/z1.urdf"' in made.text(tmp_path)
+    with pytest.raises(AssetError, match=r"a URI such as package:NAME/arm.urdf"):
+        draft("nothing:z1.urdf")

@@ -116,7 +116,7 @@ def test_a_world_of_includes_and_nested_models(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "ball": (ARM.replace('"revolute"', '"ball"'), "is of type 'ball'"),
+    "screw": (ARM.replace('"revolute"', '"screw"'), "is of type 'screw'"),
     "number": (ARM.replace("<mass>2", "<mass>two"), r"arm.sdf:2: <mass> is 'two'; expected 1 finite numbers"),
     "frame": (ARM.replace('relative_to="mount"', 'relative_to="mont"'), "no frame 'mont'; did you mean 'mount'"),
     "cycle": (ARM.replace('name="mount">', 'name="mount" attached_to="upper">'), "is relative to itself"),
@@ -176,3 +176,93 @@ def test_each_element_that_is_left_out_is_in_the_report(tmp_path: Path) -> None:
             node.set(row.attributes.split()[0], "x")
         told = "\n".join(map(str, notes_of(root)))
         assert row.text in told, row
+
+
+def _whole() -> str:
+    """A model with each element and attribute of links, joints and frames that the table says are read."""
+    turned = '<pose relative_to="f" rotation_format="euler_rpy" degrees="true">0.1 0.2 0.3 10 20 30</pose>'
+    placed = turned.replace(' relative_to="f"', "")
+    size = "<radius>0.1</radius><length>0.4</length>"
+    shapes = (
+        "<box><size>1 2 3</size></box>",
+        "<sphere><radius>0.1</radius></sphere>",
+        f"<cylinder>{size}</cylinder>",
+        f"<capsule>{size}</capsule>",
+        "<mesh><uri>thing.obj</uri><scale>1 1 1</scale></mesh>",
+    )
+    looks = "<material><diffuse>1 0 0 1</diffuse></material><transparency>0.5</transparency>"
+    geometry = "".join(
+        f'<{tag} name="{tag}{i}">{turned}<geometry>{shape}</geometry>{looks if tag == "visual" else ""}</{tag}>'
+        for tag in ("visual", "collision")
+        for i, shape in enumerate(shapes)
+    )
+    values = {key: 0.2 if key[1] == key[2] else 0.01 for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
+    tensor = "".join(f"<{key}>{value}</{key}>" for key, value in values.items())
+    inertial = f"<inertial>{placed}<mass>2</mass><inertia>{tensor}</inertia></inertial>"
+    above = turned.replace(' relative_to="f"', ' relative_to="a"')
+    return (
+        f'<model name="m"><frame name="f" attached_to="b">{above}</frame>'
+        f'<link name="b">{turned}<gravity>false</gravity>{inertial}{geometry}</link><link name="a">{INERTIAL}</link>'
+        f'<link name="c"><pose>0 0.5 0 0.3 0 0</pose>{INERTIAL}</link><joint name="j" type="revolute">{turned}'
+        "<parent>a</parent><child>b</child><axis><xyz>1 0 1</xyz>"
+        "<use_parent_model_frame>0</use_parent_model_frame><limit>"
+        "<lower>-1</lower><upper>1</upper><effort>5</effort><velocity>4</velocity></limit><dynamics>"
+        "<damping>1</damping><friction>1</friction><spring_stiffness>1</spring_stiffness>"
+        '<spring_reference>0.1</spring_reference></dynamics></axis></joint><joint name="k" type="revolute">'
+        '<parent>f</parent><child>c</child><axis><xyz expressed_in="f">0 0 1</xyz><mimic joint="j">'
+        "<multiplier>2</multiplier><offset>0.1</offset><reference>0.1</reference></mimic></axis></joint></model>"
+    )
+
+
+OTHERWISE = {
+    "name": "own", "type": "prismatic", "relative_to": "c", "attached_to": "c", "degrees": "false", "joint": "k",
+    "rotation_format": "quat_xyzw", "expressed_in": "__model__", "uri": "other.obj", "gravity": "true",
+    "parent": "c", "child": "a", "use_parent_model_frame": "1",
+}  # fmt: skip
+LEAVES = [
+    (row.path, key)
+    for row in ROWS
+    for key in (row.attributes.split() or [""])
+    if row.fate in (Fate.EXACT, Fate.APPROXIMATED) and row.path.split("/")[1:2] in (["link"], ["joint"], ["frame"])
+]
+
+
+def test_what_the_table_reads_of_links_joints_and_frames_is_in_the_model(tmp_path: Path) -> None:
+    """Another value is another model, or an error that says why not: nothing that is read has no effect."""
+    from lxml import etree
+
+    corners = ("0 0 0", "1 0 0", "0 1 0", "0 0 1")
+    for name, size in (("thing.obj", 1), ("other.obj", 3)):
+        lines = [*(f"v {c.replace('1', str(size))}" for c in corners), "f 1 3 2", "f 1 2 4", "f 2 3 4", "f 1 4 3"]
+        (tmp_path / name).write_text("\n".join(lines))
+
+    def read(root: etree._Element) -> str:
+        try:
+            model = import_asset(written(tmp_path, etree.tostring(root, encoding="unicode")))
+        except AssetError as error:
+            return str(error)
+        meshes = [(mesh.name, mesh.hash) for mesh in model.meshes]
+        return repr((model.bodies, model.joints, model.geoms, model.sites, dict(model.links), meshes, model.report))
+
+    text = sdf(_whole())
+    before, same, absent = read(etree.fromstring(text)), [], []
+    assert before.startswith("((Body("), before
+    for path, key in LEAVES:
+        root = etree.fromstring(text)
+        found = [n for n in root.iterfind(path) if (n.get(key) is not None if key else not len(n))]
+        container = not key and root.find(path) is not None and not found
+        if container:
+            continue  # what it holds has rows of its own
+        if not found:
+            absent.append((path, key))
+            continue
+        old = found[0].get(key, "") if key else found[0].text or ""
+        own = key or path.rpartition("/")[2]
+        new = OTHERWISE[own] if own in OTHERWISE else " ".join(str(0.7 * float(word)) for word in old.split())
+        if key:
+            found[0].set(key, new)
+        else:
+            found[0].text = new
+        if read(root) == before:
+            same.append((path, key))
+    assert (absent, same) == ([], [])

@@ -275,6 +275,20 @@ def test_a_visual_that_cannot_be_read_is_dropped_and_reported(urdf: Load, inerti
     assert "is not fully shown" in notes(model, "dropped")
 
 
+def test_looks_that_are_not_there_are_reported_and_what_collides_is_refused(urdf: Load, inertial: Text) -> None:
+    visual = '<visual><geometry><mesh filename="{}"/></geometry></visual>'
+    model = urdf(link("a", inertial(1) + visual.format("gone.stl") + BALL.format(1)))
+    assert "link 'a' (arm.urdf:3): is not fully shown: 'gone.stl', which does not exist" in notes(model, "dropped")
+    with pytest.raises(AssetError, match="there is no package 'nowhere'"):  # that has a remedy
+        urdf(link("a", inertial(1) + visual.format("package://nowhere/gone.stl")))
+
+
+def test_a_shape_of_no_size_is_reported(urdf: Load, inertial: Text) -> None:
+    model = urdf(link("a", inertial(1) + BALL.format(0) + BALL.format(1)))
+    assert [geom.shape for geom in model.geoms] == [Sphere(1.0)]
+    assert "link 'a' (arm.urdf:3): has a <sphere> of size 0" in notes(model, "dropped")
+
+
 A, B, C = link("a"), link("b"), link("c")
 BALL = '<collision><geometry><sphere radius="{}"/></geometry></collision>'
 PLANE = '<collision><geometry><plane normal="0 0 1"/></geometry></collision>'
@@ -287,9 +301,13 @@ REFUSED = {
     "two parents": (A + B + C + joint("j", "a", "c") + joint("k", "b", "c"), "the link 'c' has two parents"),
     "apart": (A + B + C + joint("j", "b", "c") + joint("k", "c", "b"), "2 links form a loop apart from the root"),
     "unknown link": (A + joint("j", "a", "z"), "joint 'j' (arm.urdf:3) refers to the link 'z', which does not exist"),
-    "planar": (A + B + joint("j", "a", "b", "planar"), "joint 'j' (arm.urdf:3) is of type 'planar'; the neutral model"),
-    "floating": (A + B + joint("j", "a", "b", "floating"), "is of type 'floating'"),
-    "spherical": (A + B + joint("j", "a", "b", "spherical"), "is of type 'spherical'"),
+    "type": (A + B + joint("j", "a", "b", "screw"), "(arm.urdf:3) is of type 'screw'; known are fixed, revolute"),
+    "planar axis": (
+        A + B + joint("j", "a", "b", "planar", '<axis xyz="0 0 0"/>'), "joint 'j' (arm.urdf:3) has an axis of length 0",
+    ),
+    "several follow": (
+        A + B + joint("j", "a", "b", "spherical", '<mimic joint="k"/>'), "has several axes (spherical) and follows 'k'",
+    ),
     "duplicate link": (A + A, "two links have the name 'a'"),
     "duplicate joint": (A + B + C + joint("j", "a", "b") + joint("j", "b", "c"), "two joints have the name 'j'"),
     "no mass": (A + B + joint("j", "a", "b"), "no link that moves has a mass"),

@@ -129,9 +129,9 @@ def import_(
     file: Annotated[
         str,
         typer.Argument(
-            metavar="FILE|FOLDER|NAME",
-            help="A URDF, xacro, SDF or MJCF file, FILE.xml#BODY for one of several bodies; a folder with one; or a "
-            "name of robot_descriptions, as panda_description.",
+            metavar="FILE|FOLDER|URI|NAME",
+            help="A URDF, xacro, SDF or MJCF file, FILE.xml#BODY for one of several bodies; a folder with one; a URI, "
+            "as package:NAME/FILE; or a name of robot_descriptions, as panda_description.",
         ),
     ],
     out: Annotated[
@@ -151,25 +151,37 @@ def import_(
         typer.Option("--arg", metavar="NAME:=VALUE", help="An argument of a xacro file; may be given again."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            "--engine", "-e", help="Engines to try it on, separated by commas, or `all` (default), or `none`."
+        ),
+    ] = None,
+    hold: Annotated[float, typer.Option(min=0.02, help="Simulated time that it has to hold still [s].")] = 2.0,
     json: AsJson = False,
 ) -> None:
-    """Write a draft of a catalogue entry for a model file, and read it back from the engines.
+    """Write a draft of a catalogue entry for a model file, and try it on the engines.
 
-    Base, channels, tools, legs and gains are guessed from names, the tree and the inertias; what could not be inferred
-    stands in the draft as comments that begin with TODO, above all the licence. The draft loads and builds as it is:
-    look at it with `anysim robot DRAFT.yaml --picture draft.png`, and qualify it with `--check`.
+    Base, channels, tools, legs and gains are guessed from names, the tree and the inertias, each with its reason; what
+    could not be inferred stands in the draft as comments that begin with TODO, above all the licence. Then it is built
+    on each engine, each in a process of its own, read back, held against another loader of its file, and has to hold
+    its home position. Exit code 1 if a check fails on an engine, which the table names: the draft is written all the
+    same. Look at it with `anysim robot DRAFT.yaml --picture draft.png`; `--check` adds random actions.
 
     Examples:
       anysim robot import my_arm.urdf
       anysim robot import robot.xml --out my_robot.yaml --name my_robot
       anysim robot import my_arm.urdf --package my_meshes=../my_meshes
       anysim robot import my_arm.urdf.xacro --arg hand:=true
+      anysim robot import package:my_robots/arm/arm.urdf --engine mujoco
     """
-    from anysim.assets.catalogue import load_robot
     from anysim.cli.output import print_json
     from anysim.errors import AnysimError
-    from anysim_robots.cli.robot_work import audited
+    from anysim_robots.cli.robot_tables import tell_tried
+    from anysim_robots.cli.robot_work import qualified
     from anysim_robots.drafting.draft import draft
+    from anysim_robots.qualify.result import as_data
+    from anysim_robots.qualify.run import Durations
 
     made = draft(file, name, _packages(package or []), _arguments(arg or []))
     target = out or Path(f"{made.name}.yaml")  # never beside the model: that is somebody else's folder
@@ -177,14 +189,23 @@ def import_(
         raise AnysimError(f"there is a file {target} already; give another --out, or --force to replace it")
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text(made.text(target.parent), encoding="utf-8")
-    lines = audited(load_robot(str(target)), _engines(None))
+    engines = [] if engine == "none" else _engines(engine)
+    tried = qualified(str(target), engines, Durations(hold, 0.0), quiet=json)
     if json:
-        print_json({"file": str(target), "open": made.open, "notes": made.notes, "audit": lines})
-        return
-    typer.echo(str(target))
-    for words in made.notes:
-        typer.echo(f"  importer: {words}")
-    for words in made.open:
-        typer.echo(f"  TODO {words}")
-    for engine, words in lines.items():
-        typer.echo(f"  audit on {engine}: {words}")
+        print_json(
+            {
+                "file": str(target),
+                "guessed": made.guess.reasons,
+                "open": made.open,
+                "notes": made.notes,
+                "engines": {one.engine: as_data(one) for one in tried},
+            }
+        )
+    else:
+        typer.echo(str(target))
+        for kind, lines in (("importer:", made.notes), ("guessed", made.guess.reasons), ("TODO", made.open)):
+            for words in lines:
+                typer.echo(f"  {kind} {words}")
+        tell_tried(tried)
+    if any(one.status != "qualified" for one in tried):
+        raise typer.Exit(1)

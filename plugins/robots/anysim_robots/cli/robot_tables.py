@@ -133,3 +133,23 @@ def tell_checks(found: "Sequence[Qualification]") -> None:
         typer.echo(f"{one.engine} {one.engine_version}: {one.status}{why}")
         for check in one.checks:
             typer.echo(f"  {check.told}")
+
+
+def tell_tried(found: "Sequence[Qualification]") -> None:
+    """What each engine makes of a draft: a row each, and the reason of what did not pass below."""
+    asked = ("build", "source", "audit", "kinematics", "hold")
+    rows: list[tuple[str, ...]] = []
+    for one in found:
+        checks = {check.name: check for check in one.checks}
+        cells = [_WORDS[checks[name].passed] if name in checks else "not reached" for name in asked]
+        rows.append((f"{one.engine} {one.engine_version}", one.status, *cells))
+    if rows:
+        print_table("the draft on each engine", ("engine", "", *asked), rows, {"no": "red", "failed": "red"})
+    for one in found:
+        if one.why:
+            typer.echo(f"  {one.engine}: {one.why}")
+        for check in one.failed:
+            typer.echo(f"  {one.engine}: {check.told}")
+
+
+_WORDS = {True: "yes", False: "no", None: "not asked"}

@@ -53,23 +53,3 @@ def draw(entry: "CatalogueEntry", engines: Sequence[str], target: Path) -> str:
     target.parent.mkdir(parents=True, exist_ok=True)
     Image.fromarray(np.hstack(images)).save(target)
     return str(target)
-
-
-def audited(entry: "CatalogueEntry", engines: Sequence[str]) -> dict[str, str]:
-    """Build an entry on each engine and read it back; by engine what came of it."""
-    from anysim.api import compile_world, load
-    from anysim.compile.edit import unseen
-    from anysim.engine.factory import create_simulation
-    from anysim.errors import AnysimError
-    from anysim_robots.qualify.stage import stage
-    from anysim_robots.qualify.statics import audit_check
-
-    world = unseen(compile_world(load(stage(entry))))
-    told: dict[str, str] = {}
-    for name in engines:
-        try:
-            with create_simulation(name) as simulation:
-                told[name] = audit_check(simulation.create_world(world)).told
-        except AnysimError as error:
-            told[name] = f"cannot build it: {error}"
-    return told

@@ -17,10 +17,13 @@ from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SETTLING, STANDING, G
 from anysim_robots.drafting.guess import Guess, guess, home_of, within
 from anysim_robots.drafting.sources import source_of
 from anysim_robots.drafting.srdf import Srdf, beside, read
+from anysim_robots.drafting.stance import stood
 
 HOMES = ("home", "ready", "half_sitting", "standing", "default", "initial")
 """Names of poses that a robot begins in, the likelier first."""
 
+GRIPPER = 4
+"""Joints that one command opens and closes at first; fingers of a hand are moved one by one."""
 NO_LICENCE = "LicenseRef-TODO"
 
 
@@ -86,7 +89,7 @@ class Draft(NamedTuple):
     def _channels(self) -> list[str]:
         g = self.guess
         legs = tuple(dict.fromkeys(joint for leg in g.legs for joint in leg.joints))
-        base = legs + tuple(wheel for wheel in g.wheels if wheel not in legs)
+        base = g.carried or legs + tuple(wheel for wheel in g.wheels if wheel not in legs)
         channels = {"base": base, "arm": g.arm, "eef": g.eef}
         if not any(channels.values()):
             return ["channels: {}"]
@@ -144,14 +147,27 @@ class Draft(NamedTuple):
             if all(end is not None for end in ends):
                 opened = ", ".join(repr(end[0]) for end in ends if end is not None)
                 closed = ", ".join(repr(end[1]) for end in ends if end is not None)
+                gripper, hand = "gripper_binary: {}, joint_position: {}", "joint_position: {}, gripper_binary: {}"
                 return [
                     f"    opened: [{opened}]  # the limit that is farther from zero",
                     f"    closed: [{closed}]",
-                    "    controllers: {gripper_binary: {}, joint_position: {}}",
+                    f"    controllers: {{{gripper if len(joints) <= GRIPPER else hand}}}",
                 ]
         if set(joints) <= set(self.guess.wheels):
             return []
         return ["    controllers: {joint_position: {}, joint_delta_position: {}}"]
+
+    def _at_an_end(self) -> dict[str, float]:
+        """Where a gripper begins that one command opens or closes: at the end that is nearer to where it is."""
+        eef = self.guess.eef
+        ends = [self._ends(joint) for joint in eef]
+        if not 0 < len(eef) <= GRIPPER or any(end is None for end in ends):
+            return {}
+        at = {joint.name: joint.initial for joint in self.model.joints}
+        pairs = [(end[0], end[1]) for end in ends if end is not None]
+        far = [sum(abs(at[joint] - pair[side]) for joint, pair in zip(eef, pairs, strict=True)) for side in (0, 1)]
+        side = 0 if far[0] <= far[1] else 1
+        return {joint: pair[side] for joint, pair in zip(eef, pairs, strict=True) if pair[side] != at[joint]}
 
     def _ends(self, joint: str) -> tuple[float, float] | None:
         """Open and closed position of a finger."""
@@ -163,7 +179,7 @@ class Draft(NamedTuple):
 
     def _rest(self) -> list[str]:
         g, lines = self.guess, []
-        home, poses = home_of(self.model), {} if self.srdf is None else self.srdf.poses
+        home, poses = home_of(self.model) | self._at_an_end(), {} if self.srdf is None else self.srdf.poses
         told = _home_pose(self.srdf)
         if told:
             lines.append(f"# Home is the pose '{told}' of the SRDF, within the limits.")
@@ -220,8 +236,13 @@ def draft(
     if srdf is not None:
         model = _at_home(model, srdf)
     found = guess(model)
+    if found.floating and not _home_pose(srdf):
+        model, stance = stood(model, found.legs)
+        if stance:
+            found = found._replace(base_height=guess(model).base_height, reasons=(*found.reasons, stance))
     legs = frozenset(joint for leg in found.legs for joint in leg.joints)
-    stem = source.uri.partition(":")[2] or path.name.split(".")[0]
+    named = source.uri.partition(":")[2]
+    stem = named if named and "/" not in named else path.name.split(".")[0]
     chosen = re.sub(r"\W+", "_", name or body or stem).strip("_").lower()
     if not chosen or not chosen[0].isalpha():
         chosen = f"robot_{chosen}".rstrip("_")

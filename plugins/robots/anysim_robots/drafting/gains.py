@@ -12,7 +12,7 @@ BANDWIDTH = 5.0
 """[Hz]"""
 ROTOR = 0.1
 """Armature as a share of the inertia that the joint sees: keeps the last links of a chain from being too light."""
-STANDING = 0.5
+STANDING = 2.0
 """[m] Of a robot on legs kp is at least this times its weight, so that the legs do not sag visibly."""
 SETTLING = 0.03
 """[s] and kd at least this times kp, so that it comes to rest."""

@@ -47,6 +47,8 @@ class Guess(NamedTuple):
     reasons: tuple[str, ...]
     anchored: tuple[str, ...] = ()
     """Joints by which its first body moves against the world, and which no drive of the file moves."""
+    carried: tuple[str, ...] = ()
+    """Joints that carry it over the ground, and are driven: slides, and maybe a turn, between an empty root and it."""
 
 
 def alone(model: ImportedModel, floating: bool) -> World:
@@ -91,12 +93,16 @@ def guess(model: ImportedModel) -> Guess:
     in_legs = {joint for leg in legs for joint in leg.joints}
     wheels = [names[i] for i in names if WHEEL.search(names[i]) and _endless(model, i)]
     eef = [n for i, n in names.items() if n not in in_legs and n not in wheels and _is_finger(model, i)]
-    arm = [n for n in names.values() if n not in {*in_legs, *wheels, *eef}]
+    slides = [j for j in rails if model.joints[j].type is JointType.PRISMATIC]
+    carried = [names[j] for j in rails if j in names] if len(slides) == 2 and len(rails) <= 3 else []
+    arm = [n for n in names.values() if n not in {*in_legs, *wheels, *eef, *carried}]
     planted = bool(rails) and not model.bodies[0].inertial.mass
     floating = model.bodies[0].kind is BodyKind.FREE or ((len(legs) >= 2 or len(wheels) >= 2) and not planted)
     if planted and not floating and (passive or len(legs) >= 2 or len(wheels) >= 2):
         how = ", ".join(model.joints[j].name for j in rails)
         reasons.append(f"base: fixed; its first body moves against the world by {how}")
+    elif carried and planted:
+        reasons.append(f"base: fixed; {', '.join(carried)} between an empty root and its first body carry it")
     elif model.bodies[0].kind is BodyKind.FREE:
         reasons.append("base: floating, as the file has it")
     else:
@@ -105,13 +111,13 @@ def guess(model: ImportedModel) -> Guess:
             f"base: floating, because of {why}" if floating else "base: fixed; it has neither legs nor wheels"
         )
     if not floating:
-        arm, legs = [n for n in names.values() if n not in eef and n not in wheels], []
+        arm, legs = [n for n in names.values() if n not in {*eef, *wheels, *carried}], []
     height = max(0.0, -float(low)) if floating and np.isfinite(low) else 0.0
     roots = {chain[0] for chain in chains if len(chain) > 1}
     if not floating and not eef and len(roots) >= 3:
         arm, eef = [], arm
         reasons.append(f"a hand, because {len(roots)} chains begin at its base")
-    category = _category(legs, wheels, arm, eef)
+    category = _category(legs, [*wheels, *carried], arm, eef)
     tool = _tool(model, arm, eef)
     return Guess(
         floating,
@@ -124,6 +130,7 @@ def guess(model: ImportedModel) -> Guess:
         round(height, 4),
         tuple(reasons),
         tuple(model.joints[j].name for j in sorted(passive)),
+        tuple(carried),
     )
 
 

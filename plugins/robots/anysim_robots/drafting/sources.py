@@ -1,4 +1,4 @@
-"""Sources of a draft: a file, a folder with one, or a name of robot_descriptions."""
+"""Sources of a draft: a file, a folder with one, a URI, or a name of robot_descriptions."""
 
 import importlib
 import importlib.util
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from anysim import registry
-from anysim.assets.load import split_body
+from anysim.assets.load import model_file, split_body
 from anysim.errors import AssetError, listing
 
 DESCRIPTIONS = "robot_descriptions"
@@ -27,21 +27,23 @@ class Source(NamedTuple):
 
 
 def source_of(what: str) -> Source:
-    """The source that a path, a folder or a name of robot_descriptions stands for.
+    """The source that a path, a folder, a URI or a name of robot_descriptions stands for.
 
     Raises:
         AssetError: there is none, a folder has several or no models, or a description is not in its cache.
     """
     name = what.removeprefix(f"{DESCRIPTIONS}:")
     path = Path(split_body(what)[0])
+    if not path.exists() and re.match(r"(package|example-robot-data):", what):
+        return Source(model_file(what).path, what)
     if name != what or (not path.exists() and re.fullmatch(r"\w+_description", what)):
         return _description(name)
     if path.is_dir():
         return Source(_in_folder(path))
     if not path.is_file():
         raise AssetError(
-            f"there is no file {path}; `anysim robot import` takes a model file, a folder with one, or a name of "
-            f"{DESCRIPTIONS} such as panda_description"
+            f"there is no file {path}; `anysim robot import` takes a model file, a folder with one, a URI such as "
+            f"package:NAME/arm.urdf, or a name of {DESCRIPTIONS} such as panda_description"
         )
     return Source(Path(what))
 

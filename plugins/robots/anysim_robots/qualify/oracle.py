@@ -156,7 +156,11 @@ class Urdf:
         del root, body
         self._file = _yourdfpy(path)
         robot = self._file.robot
-        moving = [joint for joint in robot.joints if joint.type not in ("fixed", "floating", "planar")]
+        children = {joint.child for joint in robot.joints}
+        several = [j for j in robot.joints if j.type in _SEVERAL and (j.type != "floating" or j.parent in children)]
+        if several:
+            raise PluginError(f"yourdfpy does not move joints of several axes ({several[0].type} '{several[0].name}')")
+        moving = [joint for joint in robot.joints if joint.type not in ("fixed", "floating")]
         self.joints: int | None = len(moving)
         masses = [link.inertial.mass for link in robot.links if link.inertial is not None]
         self.mass: float | None = float(sum(mass for mass in masses if mass is not None and isfinite(mass)))
@@ -169,7 +173,6 @@ class Urdf:
             for joint in moving
             if joint.mimic is not None
         }
-        children = {joint.child for joint in robot.joints}
         self.root = next(link.name for link in robot.links if link.name not in children)
 
     def frames(self, joint_pos: Mapping[str, float]) -> Mapping[str, Array]:
@@ -192,4 +195,10 @@ def _yourdfpy(path: Path):
     import logging
 
     logging.getLogger("yourdfpy").setLevel(logging.ERROR)
-    return yourdfpy.URDF.load(str(path), load_meshes=False, build_collision_scene_graph=False)
+    try:
+        return yourdfpy.URDF.load(str(path), load_meshes=False, build_collision_scene_graph=False)
+    except Exception as error:  # it raises what its parsers do
+        raise PluginError(f"yourdfpy cannot read {path.name}: {error}") from error
+
+
+_SEVERAL = ("planar", "floating", "spherical")

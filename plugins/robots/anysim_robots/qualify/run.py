@@ -19,7 +19,7 @@ from anysim_robots.qualify.statics import audit_check, facts_of, kinematics_chec
 
 
 class Durations(NamedTuple):
-    """Simulated time of the checks that move [s]."""
+    """Simulated time of the checks that move [s]; without `random` there are no random actions and no replay."""
 
     hold: float = 5.0
     random: float = 10.0
@@ -122,6 +122,8 @@ def _moving(entry: CatalogueEntry, engine: str, durations: Durations, tell: Call
     tell("hold")
     with _noted(found, "hold"), make(stage(entry), engine=engine, num_envs=1) as env:
         found.append(hold_check(env, durations.hold))
+        if not durations.random:
+            return found
         tell("random")
         with _noted(found, "random"):
             found += random_checks(env, durations.random, durations.replay, tell)
