@@ -153,6 +153,7 @@ def add_geom(spec: Any, owner: Any, geom: Geom, world: World) -> Any:
         solmix=surface.solmix,
         group=groups.get((geom.visible, geom.collides), UNSEEN),
         mass=0.0,
+        margin=surface.margin,
         gap=surface.gap,
     )
     if isinstance(geom.shape, MeshShape):
