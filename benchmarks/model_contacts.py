@@ -14,7 +14,7 @@ import argparse
 import json
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations
 from math import inf
@@ -27,10 +27,12 @@ import numpy as np
 from anysim import load
 from anysim.api import compile_world
 from anysim.assets.load import import_asset
-from anysim.conventions import WORLD, Array
+from anysim.conventions import IDENTITY_QUATERNION, WORLD, Array
 from anysim.engine.factory import create_simulation
 from anysim.errors import AnysimError
-from anysim.model.world import Actuator, BodyKind, ControlMode, World
+from anysim.math import pose as P
+from anysim.model.world import Actuator, BodyKind, ControlMode, SpatialTendon, World
+from anysim_mujoco.mjcf.couplings import Couplings
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
 
 STEPS = 100
@@ -104,6 +106,7 @@ def scene(source: Source, row: Row) -> tuple[World, list[int]]:
         objects[f"tree{root}"] = thing
         kept.append(root)
     world = compile_world(load({"world": {"objects": objects, "terrain": {"kind": "none"}}}))
+    world = replace(world, spatial_tendons=(*world.spatial_tendons, *strings(source, world, kept)))
     reader = GeomReader(model, str(source.path), 1.0, 0.0, [])
     mujoco.mj_kinematics(model, source.data)
     for number in range(model.nbody):
@@ -137,6 +140,22 @@ def scene(source: Source, row: Row) -> tuple[World, list[int]]:
             if joint.mimic is None
         ),
     ), kept
+
+
+def strings(source: Source, world: World, roots: list[int]) -> Iterator[SpatialTendon]:
+    """Those that tie a tree to another: trees that are imported one by one have none of them."""
+    model, place = source.model, dict[int, tuple[int, Array]]()
+    for number in range(1, model.nbody):
+        if (root := int(model.body_rootid[number])) in roots:
+            entity = world.entities[roots.index(root)]
+            asset = import_asset(entity.source)
+            frame = asset.frames[model.body(number).name or f"body{number - root + 1}"]
+            place[number] = entity.body_start + frame.body, P.pose(frame.position, frame.quaternion)
+    if len(place) == model.nbody - 1:
+        whole = Couplings(model, 1.0, {}, lambda _: 1.0, place, False, P.pose((0.0,) * 3, IDENTITY_QUATERNION))
+        for tendon in whole.spatial_tendons():
+            if len({world.body_entity[body] for body in tendon.bodies}) > 1:
+                yield tendon
 
 
 def apart(source: Source, world: World, roots: list[int]) -> frozenset[tuple[int, int]]:
