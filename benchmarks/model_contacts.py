@@ -264,6 +264,7 @@ def compared(path: Path, source: str, engines: tuple[str, ...]) -> Row:
     except (AnysimError, ValueError) as error:
         return replace(row, refused={"": " ".join(str(error).split()).replace(str(path), path.name)})
     if not roots:
+        row.refused.setdefault("", "nothing in it moves")
         return row
     track = Track(own, roots, world)
     row.touching = track.touching
