@@ -268,16 +268,6 @@ class ClaimsTorsionalFriction(Right):
         return replace(world, geoms=plain)
 
 
-class ClaimsCompliance(Right):
-    """Contacts are as stiff as the engine has them."""
-
-    caught_by = ("test_approximations.py::test_an_error_is_no_larger_than_declared",)
-
-    def _spoil(self, world):
-        stiff = tuple(replace(g, surface=replace(g.surface, compliance=None)) for g in world.geoms)
-        return replace(world, geoms=stiff)
-
-
 class ClaimsSolverSettings(Right):
     """Settings of a body's own are taken and forgotten."""
 

@@ -80,3 +80,13 @@ class ClaimsWelds(Right):
 
     def _spoil(self, world):
         return replace(world, constraints=tuple(replace(c, kind=ConstraintKind.CONNECT) for c in world.constraints))
+
+
+class ClaimsCompliance(Right):
+    """Contacts are as stiff as the engine has them."""
+
+    caught_by = ("test_approximations.py::test_an_error_is_no_larger_than_declared",)
+
+    def _spoil(self, world):
+        stiff = tuple(replace(g, surface=replace(g.surface, compliance=None)) for g in world.geoms)
+        return replace(world, geoms=stiff)

@@ -17,8 +17,8 @@ from anysim_mujoco.couplings import CouplingBuilder
 from anysim_mujoco.geoms import UNSEEN, add_assets, add_geom, add_look
 from anysim_mujoco.inertia import principal
 from anysim_mujoco.layout import Handles, Layout
+from anysim_mujoco.mjcf.surfaces import DRY_IMPEDANCE, Stiffness
 from anysim_mujoco.options import MujocoOptions
-from anysim_mujoco.surfaces import DRY_IMPEDANCE, Stiffness
 
 
 class BuiltModel(NamedTuple):

@@ -10,7 +10,7 @@ from anysim.conventions import wxyz_from_xyzw
 from anysim.model.world import ConstraintKind, SpatialTendon, Tendon, World, Wrap
 from anysim_mujoco.audit import UNLIMITED
 from anysim_mujoco.geoms import UNSEEN
-from anysim_mujoco.surfaces import DRY_IMPEDANCE, ConstraintFields, Stiffness
+from anysim_mujoco.mjcf.surfaces import DRY_IMPEDANCE, ConstraintFields, Stiffness
 
 
 class CouplingBuilder:

@@ -21,9 +21,9 @@ from anysim.model.world import (
     Sphere,
     World,
 )
+from anysim_mujoco.mjcf.surfaces import contact_parameters
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.skins import GROUND, NEUTRAL_RGBA, PLAIN, add_looks, look_name
-from anysim_mujoco.surfaces import contact_parameters
 
 VISIBLE, VISUAL_ONLY, COLLISION_ONLY, UNSEEN = range(4)
 """Geom groups: drawn and colliding, drawn, colliding, neither."""

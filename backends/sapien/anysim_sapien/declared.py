@@ -50,8 +50,7 @@ _APPROXIMATE = {
         "percent off"
     ),
     Capability.COMPLIANCE: approximately(
-        "ignored: contacts, limits and ties are as stiff as PhysX has them and begin at touch, contacts that a file "
-        "has without friction have that of the pair; a ball on a spring of a contact sinks by {unyielding:.0%} less",
+        "ignored: contacts, limits, ties are as PhysX has them; a sprung ball sinks by {unyielding:.0%} less",
         unyielding=1.0,
     ),
     Capability.MATERIALS: (
@@ -60,13 +59,9 @@ _APPROXIMATE = {
     ),
     Capability.CONTACT_POINTS: "the friction of a pair, as sensors have it, is shared as the normal forces are",
 }
-_ABSENT = (
-    Capability.RENDER_SHADOWS,
-    Capability.MIMIC_CURVES,
-    Capability.TENDON_LIMITS,
-    Capability.TENDON_DRIVES,
-    Capability.SPATIAL_TENDONS,
-)
+_ABSENT = [
+    Capability[name] for name in "RENDER_SHADOWS MIMIC_CURVES TENDON_LIMITS TENDON_DRIVES SPATIAL_TENDONS".split()
+]
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

@@ -39,9 +39,7 @@ class PlannedBase(Base):
         self.router: BaseRouter | None = None
         self._named: tuple[str, ...] | None = None
         # it recovers by itself first
-        self.held_up += round(
-            (PATIENCE + RECOVERY) / env.engine.world.physics.control_dt
-        )
+        self.held_up += round((PATIENCE + RECOVERY) / env.engine.world.physics.control_dt)
 
     def foresee(self, movers: Sequence[str]) -> None:
         if self.router is not None:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from anysim.model.world import Compliance
-from anysim_mujoco.surfaces import NATIVE_IMPEDANCE, NATIVE_REFERENCE
+from anysim_mujoco.mjcf.surfaces import NATIVE_IMPEDANCE, NATIVE_REFERENCE
 
 
 def mixed(solref: Any) -> bool:
