@@ -4,8 +4,9 @@
 
 Every tree of bodies that moves in a file is imported by its name. Totals of mass and inertia (relative), limits,
 springs, damping and armature are compared with those that MuJoCo has compiled, as the largest difference; then both
-are stepped 100 times from the same state under the same efforts, with the step, the gravity and the integrator
-`implicitfast` on both sides, without contacts and limits: `motion` is the largest difference of a joint's position
+are stepped 100 times from the same state under the same efforts, with the step, the gravity, the fluid of the file
+and the integrator `implicitfast` on both sides, without contacts and limits: `motion` is the largest difference of a
+joint's position
 [rad] or [m]. What acts in the file and is not in the model is named. `--names` are words for the folders in the
 results.
 """
@@ -175,14 +176,10 @@ def _row(model: ImportedModel, world: World, raw: Raw, row: Row) -> Row:
 
 def _alone(model: ImportedModel, raw: Raw) -> Iterator[str]:
     """What moves the bodies of a file and is not in the model."""
-    option = raw.model.opt
     spatial = [t for t in range(raw.model.ntendon) if not is_fixed(raw.model, t)]
-    if acting := sum(bool(tendon_effects(raw.model, t)) for t in spatial):
-        yield f"{acting} spatial tendons"
-    if option.density or option.viscosity:
-        yield "a fluid"
-    if raw.model.dof_frictionloss[raw.v].any():
-        yield "soft dry friction"
+    acting = sum(bool(tendon_effects(raw.model, t)) for t in spatial) - len(model.spatial_tendons)
+    if acting:
+        yield f"{acting} tendons to other trees"
     if any(note.where == "joint damping" and "free joint" in note.message for note in model.report):
         yield "damping of a free joint"
     if any(note.where == "joint armature" and "free joint" in note.message for note in model.report):
@@ -192,7 +189,13 @@ def _alone(model: ImportedModel, raw: Raw) -> Iterator[str]:
 def _motion(world: World, raw: Raw) -> float:
     model, data = raw.model, raw.data
     data.qpos[raw.q] = [joint.initial for joint in world.joints]
-    engine = create_simulation("mujoco").create_world(world)
+    option = model.opt
+    fluid = {
+        "density": float(option.density),
+        "viscosity": float(option.viscosity),
+        "wind": tuple(option.wind.tolist()),
+    }
+    engine = create_simulation("mujoco", constraints="mujoco", **fluid).create_world(world)
     try:
         if raw.free:
             at = int(model.jnt_qposadr[raw.free[0]])

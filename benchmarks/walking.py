@@ -29,7 +29,7 @@ from anysim.engine.state import State
 from anysim.math import pose as P
 from anysim.model.world import Surface
 from anysim_evaluation.policy import make_policy
-from anysim_mujoco.surfaces import STIFF_IMPEDANCE, ContactParameters, contact_parameters
+from anysim_mujoco.mjcf.surfaces import STIFF_IMPEDANCE, ContactParameters, contact_parameters
 
 COMMANDS = ((0.5, 0.0, 0.0), (0.9, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.8), (0.5, 0.2, 0.5))
 """Forward and to the left [m/s], turning [rad/s]."""

@@ -2,9 +2,10 @@
 
     python scripts/importing_table.py [--check]
 
-The figures of the models are those of docs/models.json, which `python benchmarks/models.py FOLDER... --json` writes,
-those of drafts of docs/drafts.json, which `python benchmarks/drafts.py` writes. `--check` writes nothing and exits with
-1 if the page has drifted from the code.
+The figures of the models are those of docs/models.json and docs/model_contacts.json, which `python
+benchmarks/models.py FOLDER... --json` and `python benchmarks/model_contacts.py FOLDER... --json` write, those of drafts
+of docs/drafts.json, which `python benchmarks/drafts.py` writes. `--check` writes nothing and exits with 1 if the page
+has drifted from the code.
 """
 
 import json
@@ -39,6 +40,24 @@ def models() -> str:
         figures = f"{row['joints']} | {row['springs']} | {worst:.0e} | {row['motion']:.0e}"
         lines.append(f"| `{row['model']}` | {row['source']} | {figures} | {row['alone']} |")
     return "\n".join(lines)
+
+
+def contacts() -> str:
+    """The same files as whole scenes in contact: largest differences of each engine from MuJoCo itself."""
+    lines = ["| file | of | steps in contact | MuJoCo | PyBullet | SAPIEN | left out |", "|---" * 7 + "|"]
+    for row in json.loads((ROOT / "docs/model_contacts.json").read_text("utf-8")):
+        others = [_figure(row["others"].get(engine)) for engine in ("pybullet", "sapien")]
+        out = "; ".join(f"`{tree}`" if tree else why for tree, why in row["refused"].items())
+        figures = " | ".join([str(row["touching"]), _figure(row["mujoco"]), *others])
+        lines.append(f"| `{row['model']}` | {row['source']} | {figures} | {out} |")
+    return "\n".join(lines)
+
+
+def _figure(value: float | str | None) -> str:
+    """A difference, or why an engine refuses the world."""
+    if isinstance(value, str):
+        return "refused: " + value.partition(". Choose another engine")[0].partition("cannot run 'world': ")[2]
+    return "" if value is None else f"{value:.0e}"
 
 
 ENGINES = ("mujoco", "pybullet", "sapien")
@@ -97,6 +116,6 @@ def cell(words: str, longest: int = 200) -> str:
 if __name__ == "__main__":
     tables = {"URDF": urdf.rows, "SDF": sdf.rows, "MJCF": mjcf.rows}
     contents: dict[str, Callable[[], str]] = {name: lambda rows=rows: table(rows()) for name, rows in tables.items()}
-    contents |= {"models": models, "drafts": drafts}
+    contents |= {"models": models, "contacts": contacts, "drafts": drafts}
     page = ("docs/importing.md",)
     sys.exit(max(main(__doc__, name, "importing_table.py", page, content) for name, content in contents.items()))

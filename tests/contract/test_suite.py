@@ -78,7 +78,9 @@ def test_the_articulated_example_passes(words):
     assert skipped > 400
 
 
-COUPLED = {"fixed tendons: drives", "fixed tendons: limits, dry friction and armature", "mimic joints: curves"}
+COUPLED = {"fixed tendons: drives", "fixed tendons: limits, dry friction and armature", "mimic joints: curves"} | {
+    "spatial tendons"
+}
 """What MuJoCo alone has."""
 DYNAMIC = {
     "mujoco": {"render: rgb", "solver settings by entity", "terrain: triangle mesh (concave)"},

@@ -44,6 +44,16 @@ class ClaimsTendonDrives(Right):
         return replace(world, actuators=tuple(replace(a, shares=()) for a in world.actuators))
 
 
+class ClaimsSpatialTendons(Right):
+    """Strings run straight from their first end to their last."""
+
+    caught_by = ("test_couplings.py::test_a_string_through_space_pulls_by_its_length",)
+
+    def _spoil(self, world):
+        straight = tuple(replace(t, path=(t.path[0], t.path[-1])) for t in world.spatial_tendons)
+        return replace(world, spatial_tendons=straight)
+
+
 class ClaimsCurves(Right):
     """A follower keeps to the straight part of its curve."""
 
@@ -70,3 +80,13 @@ class ClaimsWelds(Right):
 
     def _spoil(self, world):
         return replace(world, constraints=tuple(replace(c, kind=ConstraintKind.CONNECT) for c in world.constraints))
+
+
+class ClaimsCompliance(Right):
+    """Contacts are as stiff as the engine has them."""
+
+    caught_by = ("test_approximations.py::test_an_error_is_no_larger_than_declared",)
+
+    def _spoil(self, world):
+        stiff = tuple(replace(g, surface=replace(g.surface, compliance=None)) for g in world.geoms)
+        return replace(world, geoms=stiff)

@@ -1,6 +1,7 @@
 """World to MuJoCo model: a natively built MjSpec, compiled."""
 
 from collections.abc import Callable
+from itertools import product
 from typing import Any, NamedTuple
 
 import mujoco
@@ -10,13 +11,14 @@ from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.engine.control import MODES, acting_gains
 from anysim.errors import EngineError
 from anysim.kinematics.inertia import check_physical
-from anysim.model.world import Actuation, Body, BodyKind, ConstraintKind, ContactSensor, Joint, JointType, World
+from anysim.model.world import Actuation, Body, BodyKind, ContactSensor, Geom, Joint, JointType, Vec3, World
 from anysim_mujoco.audit import UNLIMITED
-from anysim_mujoco.geoms import add_assets, add_geom, add_look
+from anysim_mujoco.couplings import CouplingBuilder
+from anysim_mujoco.geoms import UNSEEN, add_assets, add_geom, add_look
 from anysim_mujoco.inertia import principal
 from anysim_mujoco.layout import Handles, Layout
+from anysim_mujoco.mjcf.surfaces import DRY_IMPEDANCE, Stiffness
 from anysim_mujoco.options import MujocoOptions
-from anysim_mujoco.surfaces import DRY_IMPEDANCE, STIFF_IMPEDANCE, constraint_solref
 
 
 class BuiltModel(NamedTuple):
@@ -36,23 +38,24 @@ def build(world: World, options: MujocoOptions) -> BuiltModel:
     _settings(spec, world, options)
     add_look(spec, world, options)
     add_assets(spec, world)
-    bodies = _bodies(spec, world)
+    bodies = _bodies(spec, world, fluid=bool(options.density or options.viscosity))
     owner = lambda body: spec.worldbody if body == WORLD else bodies[body]  # noqa: E731
-    joints = [_joint(owner(joint.body), joint, world) for joint in world.joints]
-    geoms = [add_geom(spec, owner(geom.body), geom, world) for geom in world.geoms]
-    _couplings(spec, world)
-    _constraints(spec, world, owner)
-    _tendons(spec, world)
+    stiff = Stiffness(world.physics.dt, options.constraints == "mujoco")
+    joints = [_joint(owner(joint.body), joint, stiff) for joint in world.joints]
+    parts = Parts(world, owner, options)
+    geoms = [add_geom(spec, parts.owner(geom), geom, world) for geom in world.geoms]
+    CouplingBuilder(spec, world, owner, stiff).add()
     _drives(spec, world)
-    sensors = [_contact_sensor(spec, world, sensor) for sensor in world.contact_sensors]
+    sensors = [_contact_sensor(spec, parts, sensor) for sensor in world.contact_sensors]
     for low, high in sorted(world.excluded_pairs):
-        spec.add_exclude(bodyname1=body_name(world, low), bodyname2=body_name(world, high))
+        for first, second in product(parts.names(low), parts.names(high)):
+            spec.add_exclude(bodyname1=first, bodyname2=second)
     try:
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         said = " ".join(str(error).split())
         raise EngineError(f"MuJoCo cannot build the world '{world.name}': {said}") from error
-    return BuiltModel(model, Layout.of(world, model, Handles(bodies, joints, geoms, sensors)))
+    return BuiltModel(model, Layout.of(world, model, Handles(bodies, joints, geoms, sensors, parts.made)))
 
 
 def initial_row(world: World, model: Any, layout: Layout) -> Array:
@@ -68,6 +71,35 @@ def body_name(world: World, body: int) -> str:
     """The name of a body in the MjSpec: its own, but for one called `world`, which is taken."""
     name = "world" if body == WORLD else world.bodies[body].name
     return "world (body)" if body != WORLD and name == "world" else name
+
+
+class Parts:
+    """Bodies fixed to others that carry their geoms, where MuJoCo is to weigh each part of a file's body by itself."""
+
+    def __init__(self, world: World, owner: Callable[[int], Any], options: MujocoOptions) -> None:
+        self._world, self._owner, self._apart = world, owner, options.constraints == "mujoco"
+        self._places: dict[tuple[int, Vec3], Any] = {}
+        self._names: dict[int, list[str]] = {}
+        self.made: list[tuple[int, Any]] = []
+        """The World's body and the element of each."""
+
+    def owner(self, geom: Geom) -> Any:
+        """The element that a geom belongs to."""
+        com = geom.part_com
+        if com is None or not (self._apart and geom.collides):
+            return self._owner(geom.body)
+        if (geom.body, com) not in self._places:
+            own = self._names.setdefault(geom.body, [])
+            own.append(f"{body_name(self._world, geom.body)} (part {len(own)})")
+            part = self._owner(geom.body).add_body(name=own[-1])
+            part.explicitinertial, part.mass, part.ipos, part.inertia = True, 0.0, com, (0.0, 0.0, 0.0)
+            self._places[geom.body, com] = part
+            self.made.append((geom.body, part))
+        return self._places[geom.body, com]
+
+    def names(self, body: int) -> list[str]:
+        """The names of a body in the MjSpec, and of its parts."""
+        return [body_name(self._world, body), *self._names.get(body, ())]
 
 
 def _settings(spec: Any, world: World, options: MujocoOptions) -> None:
@@ -91,14 +123,16 @@ def _settings(spec: Any, world: World, options: MujocoOptions) -> None:
     explicit = physics.actuation is Actuation.EXPLICIT_PD
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{'EULER' if explicit else options.integrator.upper()}")
     option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{options.solver.upper()}")
+    option.density, option.viscosity, option.wind = options.density, options.viscosity, options.wind
     option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{options.jacobian.upper()}")
     option.iterations = options.iterations
     option.tolerance = options.tolerance
+    option.ls_iterations, option.noslip_iterations = options.ls_iterations, options.noslip_iterations
     # a diverged env must show it: MuJoCo would put it back to its default pose in silence
     option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
-def _bodies(spec: Any, world: World) -> list[Any]:
+def _bodies(spec: Any, world: World, *, fluid: bool) -> list[Any]:
     made: list[Any] = []
     for index, body in enumerate(world.bodies):
         parent = spec.worldbody if body.parent == WORLD else made[body.parent]
@@ -116,8 +150,24 @@ def _bodies(spec: Any, world: World) -> list[Any]:
             # a mocap body stands still like the world, and its pose is part of each env's state
             element.mocap = True
         _set_inertia(element, body)
+        if fluid and body.virtual:
+            _streamlined(element)
         made.append(element)
     return made
+
+
+def _streamlined(element: Any) -> None:
+    """Have a body feel nothing of a fluid: MuJoCo goes by its inertia, unless a shape says how it is dragged."""
+    element.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=(1e-6, 0.0, 0.0),
+        contype=0,
+        conaffinity=0,
+        group=UNSEEN,
+        mass=0.0,
+        fluid_ellipsoid=1,
+        fluid_coefs=(0.0, 0.0, 0.0, 0.0, 0.0),
+    )
 
 
 def _set_inertia(element: Any, body: Body) -> None:
@@ -129,10 +179,11 @@ def _set_inertia(element: Any, body: Body) -> None:
     element.inertia, element.iquat = moments, frame
 
 
-def _joint(element: Any, joint: Joint, world: World) -> Any:
+def _joint(element: Any, joint: Joint, stiff: Stiffness) -> Any:
     limited = bool(np.isfinite(joint.lower) or np.isfinite(joint.upper))
     kinds = {JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE, JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE}
-    stiff = constraint_solref(0.0, world.physics.dt)
+    limit = stiff.fields(joint.limit_compliance, joint.limit_softness)
+    dry = stiff.fields(joint.friction_compliance, impedance=DRY_IMPEDANCE)
     return element.add_joint(
         name=joint.name,
         type=kinds[joint.type],
@@ -143,88 +194,14 @@ def _joint(element: Any, joint: Joint, world: World) -> Any:
         stiffness=[joint.stiffness, 0.0, 0.0],
         springref=joint.spring_rest,
         frictionloss=joint.friction,
-        solref_friction=stiff,
-        solimp_friction=DRY_IMPEDANCE,
+        solref_friction=dry.solref,
+        solimp_friction=dry.solimp,
         limited=int(limited),
         range=(max(joint.lower, -UNLIMITED), min(joint.upper, UNLIMITED)),
-        solref_limit=constraint_solref(joint.limit_softness, world.physics.dt),
-        solimp_limit=STIFF_IMPEDANCE,
+        solref_limit=limit.solref,
+        solimp_limit=limit.solimp,
+        margin=limit.margin,
     )
-
-
-def _couplings(spec: Any, world: World) -> None:
-    for joint in world.joints:
-        if joint.mimic is None:
-            continue
-        equality = spec.add_equality(
-            name=f"{joint.name} (mimic)",
-            type=mujoco.mjtEq.mjEQ_JOINT,
-            objtype=mujoco.mjtObj.mjOBJ_JOINT,
-            name1=joint.name,
-            name2=world.joints[joint.mimic.joint].name,
-            solref=constraint_solref(joint.limit_softness, world.physics.dt),
-            solimp=STIFF_IMPEDANCE,
-        )
-        data = np.zeros_like(equality.data)
-        data[:2] = joint.mimic.offset, joint.mimic.multiplier
-        data[2 : 2 + len(joint.mimic.curve)] = joint.mimic.curve
-        equality.data = data
-
-
-def _constraints(spec: Any, world: World, owner: Callable[[int], Any]) -> None:
-    """Frames that are held together, as sites: what MuJoCo makes of bodies depends on where they begin."""
-    kinds = {ConstraintKind.CONNECT: mujoco.mjtEq.mjEQ_CONNECT, ConstraintKind.WELD: mujoco.mjtEq.mjEQ_WELD}
-    for one in world.constraints:
-        names = [f"{one.name} (frame)", f"{one.name} (other frame)"]
-        ends = (one.body, one.position, one.quaternion), (one.other, one.other_position, one.other_quaternion)
-        for name, (body, position, quaternion) in zip(names, ends, strict=True):
-            owner(body).add_site(name=name, pos=position, quat=wxyz_from_xyzw(np.asarray(quaternion)))
-        equality = spec.add_equality(
-            name=f"{one.name} (constraint)",
-            type=kinds[one.kind],
-            objtype=mujoco.mjtObj.mjOBJ_SITE,
-            name1=names[0],
-            name2=names[1],
-            solref=constraint_solref(one.softness, world.physics.dt),
-            solimp=STIFF_IMPEDANCE,
-        )
-        data = np.zeros_like(equality.data)
-        data[10] = 1.0  # how a weld weighs turns against shifts
-        equality.data = data
-
-
-def _tendons(spec: Any, world: World) -> None:
-    for one in world.tendons:
-        held = one.lower == one.upper
-        limited = not held and bool(np.isfinite(one.lower) or np.isfinite(one.upper))
-        tendon = spec.add_tendon(
-            name=one.name,
-            stiffness=[one.stiffness, 0.0, 0.0],
-            springlength=one.rest,
-            damping=[one.damping, 0.0, 0.0],
-            frictionloss=one.friction,
-            armature=one.armature,
-            solref_friction=constraint_solref(0.0, world.physics.dt),
-            solimp_friction=DRY_IMPEDANCE,
-            limited=int(limited),
-            range=(max(one.lower, -UNLIMITED), min(one.upper, UNLIMITED)) if limited else (0.0, 0.0),
-            solref_limit=constraint_solref(one.limit_softness, world.physics.dt),
-            solimp_limit=STIFF_IMPEDANCE,
-        )
-        for joint, coefficient in zip(one.joints, one.coefficients, strict=True):
-            tendon.wrap_joint(world.joints[joint].name, coefficient)
-        if held:
-            equality = spec.add_equality(
-                name=f"{one.name} (held)",
-                type=mujoco.mjtEq.mjEQ_TENDON,
-                objtype=mujoco.mjtObj.mjOBJ_TENDON,
-                name1=one.name,
-                solref=constraint_solref(one.limit_softness, world.physics.dt),
-                solimp=STIFF_IMPEDANCE,
-            )
-            data = np.zeros_like(equality.data)
-            data[0] = one.lower
-            equality.data = data
 
 
 def _drives(spec: Any, world: World) -> None:
@@ -252,20 +229,18 @@ def _drives(spec: Any, world: World) -> None:
         element.gainprm, element.biasprm = gain, bias
 
 
-def _contact_sensor(spec: Any, world: World, sensor: ContactSensor) -> list[Any]:
+def _contact_sensor(spec: Any, whole: Parts, sensor: ContactSensor) -> list[Any]:
     """One MuJoCo sensor per pair of a body and what it may touch; their sum is the neutral sensor."""
     body = mujoco.mjtObj.mjOBJ_BODY
     parts = []
-    for index in sensor.bodies:
-        for other in sensor.against if sensor.against is not None else (None,):
+    met = None if sensor.against is None else [name for other in sensor.against for name in whole.names(other)]
+    for own in (name for index in sensor.bodies for name in whole.names(index)):
+        for other in (None,) if met is None else met:
             element = spec.add_sensor(
-                name=f"{sensor.name} ({len(parts)})",
-                type=mujoco.mjtSensor.mjSENS_CONTACT,
-                objtype=body,
-                objname=body_name(world, index),
+                name=f"{sensor.name} ({len(parts)})", type=mujoco.mjtSensor.mjSENS_CONTACT, objtype=body, objname=own
             )
             if other is not None:
-                element.reftype, element.refname = body, body_name(world, other)
+                element.reftype, element.refname = body, other
             setup = np.zeros_like(element.intprm)
             setup[:3] = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1  # the force, summed over contacts
             element.intprm = setup

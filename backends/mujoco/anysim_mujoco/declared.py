@@ -33,6 +33,7 @@ _APPROXIMATE = {
         dragged=2e-4,
     ),
     Capability.TENDON_LIMITS: "a stiff soft constraint, as that of joint limits",
+    Capability.SPATIAL_TENDONS: "their limits are a stiff soft constraint, as those of joints",
     Capability.CONNECTS: approximately("a stiff soft constraint: {apart:g} m at 110 N on 1 kg", apart=2e-5),
     Capability.WELDS: approximately(
         "a stiff soft constraint: {askew:g} rad at 5 N m on a rod of 1 kg, and as a connect", askew=1.3e-3

@@ -21,9 +21,9 @@ from anysim.model.world import (
     Sphere,
     World,
 )
+from anysim_mujoco.mjcf.surfaces import contact_parameters
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.skins import GROUND, NEUTRAL_RGBA, PLAIN, add_looks, look_name
-from anysim_mujoco.surfaces import contact_parameters
 
 VISIBLE, VISUAL_ONLY, COLLISION_ONLY, UNSEEN = range(4)
 """Geom groups: drawn and colliding, drawn, colliding, neither."""
@@ -153,6 +153,7 @@ def add_geom(spec: Any, owner: Any, geom: Geom, world: World) -> Any:
         solmix=surface.solmix,
         group=groups.get((geom.visible, geom.collides), UNSEEN),
         mass=0.0,
+        margin=surface.margin,
         gap=surface.gap,
     )
     if isinstance(geom.shape, MeshShape):

@@ -16,6 +16,8 @@ class Handles(NamedTuple):
     joints: list[Any]
     geoms: list[Any]
     sensors: list[list[Any]]
+    parts: list[tuple[int, Any]]
+    """World bodies and bodies fixed to them that carry some of their geoms."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class Layout:
         free_joints = model.body_jntadr[bodies[free]]
         world_body = np.full(model.nbody, -1)
         world_body[bodies] = np.arange(len(bodies))
+        for owner, element in handles.parts:
+            world_body[element.id] = owner
         entity = np.array([*world.body_entity, -1]) + 1
         return cls(
             bodies=bodies,

@@ -17,8 +17,8 @@ from anysim_mujoco.dampers import Dampers
 from anysim_mujoco.drives import Drives
 from anysim_mujoco.inertia import full, principal
 from anysim_mujoco.layout import Layout
+from anysim_mujoco.mjcf.surfaces import contact_parameters, restitution_of
 from anysim_mujoco.skins import Skins
-from anysim_mujoco.surfaces import contact_parameters, restitution_of
 
 _DAMPING = {"body.linear_damping": 0, "body.angular_damping": 1}
 _LOOKS = {"geom.texture": 0, "geom.material": 1}

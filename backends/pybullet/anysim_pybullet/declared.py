@@ -27,6 +27,10 @@ _APPROXIMATE = {
         bounce=0.05,
         dent=2e-3,
     ),
+    Capability.COMPLIANCE: approximately(
+        "ignored: contacts, limits, ties are as Bullet has them; a sprung ball sinks by {unyielding:.0%} less",
+        unyielding=1.0,
+    ),
     Capability.MATERIALS: "their colour alone: TinyRenderer has neither gloss nor transparency, and nothing shines",
     Capability.TORSIONAL_FRICTION: "exact on a surface of equal friction; else off as the friction of the pair is",
     Capability.ARMATURE: (
@@ -60,7 +64,9 @@ _APPROXIMATE = {
     ),
     Capability.CONTROL_VELOCITY: "computed in each step, as position control is",
 }
-_ABSENT = (Capability.SOLVER_SETTINGS, Capability.MIMIC_CURVES, Capability.TENDON_LIMITS, Capability.TENDON_DRIVES)
+_ABSENT = [
+    Capability[name] for name in "SOLVER_SETTINGS MIMIC_CURVES TENDON_LIMITS TENDON_DRIVES SPATIAL_TENDONS".split()
+]
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

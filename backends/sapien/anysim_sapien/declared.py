@@ -49,13 +49,19 @@ _APPROXIMATE = {
         "middle of the pixel, most so on ground that reaches behind the camera; along a plane, in few rows, it is some "
         "percent off"
     ),
+    Capability.COMPLIANCE: approximately(
+        "ignored: contacts, limits, ties are as PhysX has them; a sprung ball sinks by {unyielding:.0%} less",
+        unyielding=1.0,
+    ),
     Capability.MATERIALS: (
         "the shader `lit`, which `auto` takes without a graphics card, has highlights and mirrors nothing; `trivial` "
         "shows colours and opacity alone, `default` is physically based"
     ),
     Capability.CONTACT_POINTS: "the friction of a pair, as sensors have it, is shared as the normal forces are",
 }
-_ABSENT = (Capability.RENDER_SHADOWS, Capability.MIMIC_CURVES, Capability.TENDON_LIMITS, Capability.TENDON_DRIVES)
+_ABSENT = [
+    Capability[name] for name in "RENDER_SHADOWS MIMIC_CURVES TENDON_LIMITS TENDON_DRIVES SPATIAL_TENDONS".split()
+]
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

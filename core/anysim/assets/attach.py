@@ -12,12 +12,25 @@ from typing import TypeVar
 import numpy as np
 
 from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote
-from anysim.conventions import Array
+from anysim.conventions import IDENTITY_QUATERNION, Array
 from anysim.errors import AssetError, listing, suggest
 from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.hash import split
-from anysim.model.world import Body, Constraint, Geom, HeightFieldShape, Joint, MeshShape, Quat, Site, Vec3
+from anysim.model.world import (
+    ORIGIN,
+    Body,
+    Constraint,
+    Geom,
+    HeightFieldShape,
+    Joint,
+    MeshShape,
+    Quat,
+    Site,
+    SpatialTendon,
+    Vec3,
+    Waypoint,
+)
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _GeomOrSite = TypeVar("_GeomOrSite", Geom, Site)
@@ -77,6 +90,10 @@ class _Attachment:
             tendons=(
                 *(t.renumbered(self.joint.__getitem__) for t in model.tendons),
                 *(t.renumbered(self.part_joint.__getitem__, self.prefix) for t in part.tendons),
+            ),
+            spatial_tendons=(
+                *(t.renumbered(self.body.__getitem__) for t in model.spatial_tendons),
+                *map(self._strung, part.spatial_tendons),
             ),
             constraints=(
                 *(c.renumbered(self.body.__getitem__) for c in model.constraints),
@@ -192,6 +209,19 @@ class _Attachment:
         if body <= 0:
             return self.carrier, *split(P.compose(self.frame, P.pose(position, quaternion)))
         return self.part_body[body], position, quaternion
+
+    def _strung(self, tendon: SpatialTendon) -> SpatialTendon:
+        """A spatial tendon of the part; what it runs through on its root moves along with that."""
+        path: list[Waypoint] = []
+        for point in tendon.path:
+            wrap = point.wrap
+            turn = IDENTITY_QUATERNION if wrap is None else wrap.quaternion
+            body, position, turn = self._held_end(point.body, point.position, turn)
+            if wrap is not None:
+                side_body, side, _ = self._held_end(wrap.side_body, wrap.side or ORIGIN, IDENTITY_QUATERNION)
+                wrap = wrap._replace(quaternion=turn, side=wrap.side and side, side_body=side_body)
+            path.append(Waypoint(body, position, wrap, point.pulley))
+        return replace(tendon, name=self._named(tendon.name), path=tuple(path))
 
     def _placed(self, thing: _GeomOrSite) -> _GeomOrSite:
         """A geom or site of the part; what is on its root moves along with that."""

@@ -26,6 +26,7 @@ from anysim.model.world import (
     Material,
     Mesh,
     Site,
+    SpatialTendon,
     Tendon,
     Texture,
 )
@@ -102,6 +103,7 @@ class ImportedModel:
     affordances: tuple[Affordance, ...] = ()
     tendons: tuple[Tendon, ...] = ()
     constraints: tuple[Constraint, ...] = ()
+    spatial_tendons: tuple[SpatialTendon, ...] = ()
 
     def drive_of(self, joint: int) -> ActuatorHint | None:
         """The drive that the source declares for a joint; None where it declares none, or several."""
@@ -134,7 +136,7 @@ def strange_number(model: ImportedModel) -> str:
         "geom": model.geoms,
         "site": model.sites,
     }
-    named |= {"tendon": model.tendons, "constraint": model.constraints}
+    named |= {"tendon": (*model.tendons, *model.spatial_tendons), "constraint": model.constraints}
     for kind, parts in named.items():
         for number, part in enumerate(parts):
             for name, value in _strange(part):

@@ -72,7 +72,7 @@ def _scaled(model: ImportedModel, factor: float) -> ImportedModel:
     if factor == 1.0:
         return model
     curved = any(joint.mimic is not None and joint.mimic.curve for joint in model.joints)
-    if model.tendons or model.constraints or curved:
+    if model.tendons or model.spatial_tendons or model.constraints or curved:
         raise ValueError("tendons, constraints and curves of mimic joints cannot be scaled; leave `scale` at 1")
     return replace(
         model,

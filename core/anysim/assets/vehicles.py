@@ -70,6 +70,7 @@ def planar(model: ImportedModel, name: str) -> ImportedModel:
         actuator_hints=tuple(hint.renumbered(lambda j: j + _ADDED) for hint in model.actuator_hints),
         tendons=tuple(tendon.renumbered(lambda j: j + _ADDED) for tendon in model.tendons),
         constraints=tuple(c.renumbered(lambda b: b + _ADDED) for c in model.constraints),
+        spatial_tendons=tuple(t.renumbered(lambda b: b + _ADDED) for t in model.spatial_tendons),
         excluded_pairs=frozenset((a + _ADDED, b + _ADDED) for a, b in model.excluded_pairs),
     )
 

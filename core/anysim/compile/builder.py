@@ -47,6 +47,7 @@ class WorldBuilder:
         self._materials = {material.name: material for material in world.materials}
         self.excluded = set(world.excluded_pairs)
         self.tiles, self.tendons, self.constraints = world.tiles, list(world.tendons), list(world.constraints)
+        self.spatial_tendons = list(world.spatial_tendons)
         self._notes = dict.fromkeys(world.notes)
 
     def build(self) -> World:
@@ -68,6 +69,7 @@ class WorldBuilder:
             tiles=self.tiles,
             tendons=tuple(self.tendons),
             constraints=tuple(self.constraints),
+            spatial_tendons=tuple(self.spatial_tendons),
             notes=tuple(self._notes),
         )
 
@@ -105,6 +107,7 @@ class WorldBuilder:
             self.joints.append(replace(part, lower=ends[0], upper=ends[1]))
         self.tendons += [part.renumbered(lambda j: j + joint, f"{name}.") for part in model.tendons]
         self.constraints += [part.renumbered(shift, f"{name}.") for part in model.constraints]
+        self.spatial_tendons += [part.renumbered(shift, f"{name}.") for part in model.spatial_tendons]
         for part in model.geoms:
             shape: Any = part.shape
             if isinstance(shape, MeshShape):

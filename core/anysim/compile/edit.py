@@ -157,6 +157,9 @@ def without_entity(world: World, name: str) -> World:
             for c in world.constraints
             if c.body in bodies and (c.other == WORLD or c.other in bodies)
         ),
+        spatial_tendons=tuple(
+            t.renumbered(lambda b: bodies[b]) for t in world.spatial_tendons if set(t.bodies) <= {*bodies}
+        ),
         excluded_pairs=frozenset(
             (bodies[a], bodies[b]) for a, b in world.excluded_pairs if a in bodies and b in bodies
         ),

@@ -1,6 +1,7 @@
 """Compilation of the ground of a spec. Generated ground comes from a builder of the kind `terrains`."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +15,19 @@ from anysim.compile.builder import WorldBuilder
 from anysim.conventions import GROUND, WORLD, Array
 from anysim.errors import AssetError, Issues, PluginError
 from anysim.model.appearance import Rgb, nominal_rgb
-from anysim.model.world import ORIGIN, Geom, HeightField, HeightFieldShape, MeshShape, Plane, Shape, Surface, Tile, Vec3
+from anysim.model.world import (
+    ORIGIN,
+    Compliance,
+    Geom,
+    HeightField,
+    HeightFieldShape,
+    MeshShape,
+    Plane,
+    Shape,
+    Surface,
+    Tile,
+    Vec3,
+)
 from anysim_schemas.terrain import GENERATED, TerrainSpec
 
 BUILDER = "generated"
@@ -98,5 +111,7 @@ def _add_field(
 def _add(builder: WorldBuilder, spec: TerrainSpec, shape: Shape, issues: Issues, position: Vec3 = ORIGIN) -> None:
     softness = FIELD_SOFTNESS if isinstance(shape, HeightFieldShape) else 0.0
     touch = Surface(friction=spec.friction, restitution=spec.restitution, softness=softness)
+    if spec.margin:
+        touch = replace(touch, compliance=Compliance(margin=spec.margin))
     color = (*nominal_rgb(spec.color, _GREY, issues), 1.0)
     builder.geoms.append(Geom(GROUND, WORLD, shape, position, color=color, surface=touch))

@@ -26,12 +26,15 @@ from anysim.model.world import (
     Joint,
     MeshShape,
     Plane,
+    SpatialTendon,
     Tendon,
     World,
 )
 
 _FEW = 100
 """So many bodies are asked at a time whether they can touch anything."""
+
+_GIVES_WAY = "gives way as its file says"
 
 Rows = tuple[tuple[C, object, str], ...]
 """A capability, whether it is needed, and why, in words that follow the name of the thing."""
@@ -65,6 +68,8 @@ def _things(world: World) -> Iterator[tuple[str, str, Rows]]:
     yield from ((f"body '{body.name}'", path[index], _of_body(body)) for index, body in enumerate(world.bodies))
     yield from ((f"joint '{joint.name}'", path[joint.body], _of_joint(world, joint)) for joint in world.joints)
     yield from ((f"tendon '{t.name}'", path[links[t.joints[0]]], _of_tendon(t)) for t in world.tendons)
+    for strung in world.spatial_tendons:
+        yield f"tendon '{strung.name}'", path[max(strung.bodies)], _of_spatial_tendon(strung)
     yield from ((f"constraint '{c.name}'", path[c.body], _of_constraint(c)) for c in world.constraints)
     yield from ((f"drive '{a.name}'", path[links[a.joint]], _of_drive(a)) for a in world.actuators)
     if world.actuators:
@@ -120,6 +125,7 @@ def _of_joint(world: World, joint: Joint) -> Rows:
         (C.JOINT_SPRINGS, joint.stiffness != 0, "has a spring"),
         (C.ARMATURE, joint.armature > 0, "has armature"),
         (C.JOINT_LIMITS, isfinite(joint.lower) or isfinite(joint.upper), "is limited"),
+        (C.COMPLIANCE, joint.limit_compliance or joint.friction_compliance or joint.mimic_compliance, _GIVES_WAY),
     )
 
 
@@ -137,12 +143,22 @@ def _of_tendon(tendon: Tendon) -> Rows:
     return (
         (C.TENDONS, tendon.stiffness or tendon.damping, "pulls at joints"),
         (C.TENDON_LIMITS, limited or tendon.friction or tendon.armature, own),
+        (C.COMPLIANCE, tendon.limit_compliance or tendon.friction_compliance, _GIVES_WAY),
     )
+
+
+def _of_spatial_tendon(tendon: SpatialTendon) -> Rows:
+    gives_way = tendon.limit_compliance or tendon.friction_compliance
+    return ((C.SPATIAL_TENDONS, True, "runs through space"), (C.COMPLIANCE, gives_way, _GIVES_WAY))
 
 
 def _of_constraint(constraint: Constraint) -> Rows:
     welded = constraint.kind is ConstraintKind.WELD
-    return ((C.WELDS, welded, "holds two frames together"), (C.CONNECTS, not welded, "holds two points together"))
+    return (
+        (C.WELDS, welded, "holds two frames together"),
+        (C.CONNECTS, not welded, "holds two points together"),
+        (C.COMPLIANCE, constraint.compliance or constraint.turn_scale != 1.0, _GIVES_WAY),
+    )
 
 
 def _of_drive(actuator: Actuator) -> Rows:
@@ -190,6 +206,7 @@ def _of_geom(geom: Geom) -> Rows:
         (C.SHAPE_MESH, mesh and not concave, "is a mesh"),
         (C.RESTITUTION, surface.restitution > 0, "bounces"),
         (C.TORSIONAL_FRICTION, surface.torsional, "has torsional friction"),
+        (C.COMPLIANCE, surface.compliance, _GIVES_WAY),
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.model.affordances import Affordance
-from anysim.model.shapes import ORDINARY, Shape, Surface, Vec3
+from anysim.model.shapes import HASHED_IF_GIVEN as HASHED_IF_GIVEN, ORDINARY, Compliance, Shape, Surface, Vec3
 from anysim_schemas.bounds import DEFAULT_EXTENT
 from anysim_schemas.robot_model import RobotModelSpec
 
@@ -22,8 +22,6 @@ FAR = 1e6
 
 NEVER_HASHED = MappingProxyType({"hashed": "never"})
 """Marks a field that shapes nothing that happens."""
-HASHED_IF_GIVEN = MappingProxyType({"hashed": "if given"})
-"""Marks a field that came later: worlds that leave it alone keep their hash."""
 
 
 class BodyKind(StrEnum):
@@ -94,6 +92,8 @@ class Body:
     gravity_compensation: bool = False
     damping: tuple[float, float] = (0.0, 0.0)
     solver: Solver | None = None
+    virtual: bool = field(default=False, metadata=NEVER_HASHED)
+    """Whether it is there for one of several joints of the body it carries, of whose mass it has a share."""
 
 
 class Mimic(NamedTuple):
@@ -142,6 +142,9 @@ class Joint:
     limit_softness: float = 0.0  # time constant [s] of the limit and mimic constraints; 0 leaves it to the engine
     stiffness: float = field(default=0.0, metadata=HASHED_IF_GIVEN)
     spring_rest: float = field(default=0.0, metadata=HASHED_IF_GIVEN)
+    limit_compliance: Compliance | None = field(default=None, metadata=HASHED_IF_GIVEN)
+    friction_compliance: Compliance | None = field(default=None, metadata=HASHED_IF_GIVEN)
+    mimic_compliance: Compliance | None = field(default=None, metadata=HASHED_IF_GIVEN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +165,9 @@ class Geom:
     visible: bool = True
     texture: str = ""
     material: str = ""
+    part_com: Vec3 | None = field(default=None, metadata=NEVER_HASHED)
+    """[m] The centre of mass, in the body's frame, of the rigid part that it is on in its source, where the body has
+    several. An engine that estimates how heavy a body is where it touches may be told to go by it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,15 @@
 """Shapes of geoms, and how their surfaces touch. Sizes are half sizes, in metres."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
 
 from anysim.conventions import Array
 
 Vec3 = tuple[float, float, float]
+HASHED_IF_GIVEN: Mapping[str, str] = MappingProxyType({"hashed": "if given"})
+"""Marks a field that came later: worlds that leave it alone keep their hash."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +100,24 @@ def solid_moments(shape: Shape, mass: float) -> Vec3:
             raise ValueError(f"a {type(shape).__name__} has no mass of its own")
 
 
+class Compliance(NamedTuple):
+    """How a contact, a limit, dry friction or a tie gives way, where a source says more of it than a time constant.
+
+    `reference` is a time constant [s] and a damping ratio, or, both negative, a stiffness [1/s^2] and a damping [1/s];
+    `impedance` goes from its first number to the second over the width [m or rad] of the third, with a midpoint and a
+    power, as in MuJoCo's solimp. It acts from a distance of `margin` [m or rad] on. The rest is of contacts: `gap` [m]
+    off the margin that contacts are prepared in, `weight` in the mean of two surfaces, `dimensions` of their friction:
+    1 for none, 3 along the surface, 4 about its normal too, 6 against rolling too; 0 leaves them to the surface.
+    """
+
+    reference: tuple[float, float] | None = None
+    impedance: tuple[float, float, float, float, float] | None = None
+    margin: float = 0.0
+    gap: float = 0.0
+    weight: float = 1.0
+    dimensions: int = 0
+
+
 @dataclass(frozen=True, slots=True)
 class Surface:
     """How a geom touches. The pair rule is in `anysim.conventions`.
@@ -112,6 +135,7 @@ class Surface:
     priority: int = 0
     torsional: bool = False  # torsional friction takes part in contacts of this geom
     contact_offset: float | None = None  # [m] from which on contacts are prepared; None leaves it to the engine
+    compliance: Compliance | None = field(default=None, metadata=HASHED_IF_GIVEN)
 
 
 ORDINARY = Surface()

@@ -14,7 +14,14 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.model.appearance import Material as Material, Texture as Texture
-from anysim.model.couplings import Constraint as Constraint, ConstraintKind as ConstraintKind, Tendon as Tendon
+from anysim.model.couplings import (
+    Constraint as Constraint,
+    ConstraintKind as ConstraintKind,
+    SpatialTendon as SpatialTendon,
+    Tendon as Tendon,
+    Waypoint as Waypoint,
+    Wrap as Wrap,
+)
 from anysim.model.parts import (
     FAR as FAR,
     HASHED_IF_GIVEN,
@@ -48,6 +55,7 @@ from anysim.model.parts import (
 from anysim.model.shapes import (
     Box as Box,
     Capsule as Capsule,
+    Compliance as Compliance,
     Cylinder as Cylinder,
     HeightField as HeightField,
     HeightFieldShape as HeightFieldShape,
@@ -96,6 +104,7 @@ class World:
     """Pieces of tiled ground, row by row; an env's scene stands on one of them. Empty where there is one ground."""
     tendons: tuple[Tendon, ...] = field(default=(), metadata=HASHED_IF_GIVEN)
     constraints: tuple[Constraint, ...] = field(default=(), metadata=HASHED_IF_GIVEN)
+    spatial_tendons: tuple[SpatialTendon, ...] = field(default=(), metadata=HASHED_IF_GIVEN)
     scenery: Scenery = field(default=Scenery(), metadata=HASHED_IF_GIVEN)
     notes: tuple[tuple[str, str], ...] = field(default=(), compare=False, metadata=NEVER_HASHED)
     """The name of a thing, and what its source says that is not so here; see `anysim.assets.model.ImportNote`."""

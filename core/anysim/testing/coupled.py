@@ -8,7 +8,7 @@ import numpy as np
 from anysim.conventions import WORLD, Array
 from anysim.engine.state import State
 from anysim.math import pose as P
-from anysim.model.world import Box, Constraint, ConstraintKind, ControlMode, Tendon, World
+from anysim.model.world import Box, Constraint, ConstraintKind, ControlMode, SpatialTendon, Tendon, Waypoint, World
 from anysim.testing import worlds
 from anysim.testing.drive_errors import Build
 from anysim.testing.sketch import Sketch, inertial
@@ -47,6 +47,27 @@ def pair_solution(stiffness: float, damping: float, start: Array, time: float) -
     for order in (4, 3, 2, 1):
         step = np.eye(4) + (h / order) * motion @ step
     return np.linalg.matrix_power(step, steps) @ row
+
+
+def strung(**tendon: Any) -> World:
+    """A slider of 2 kg along x on a string from (0, 0, 0.3) to it, and by a pulley of 2 on to (1, 0, 0)."""
+    s = Sketch("strung", 0.001, worlds.WEIGHTLESS)
+    base = s.robot("strung")
+    s.link("slider", base, worlds.PRISMATIC, worlds.X, inertial(Box((0.1, 0.1, 0.1)), MASSES[0]), initial=0.4)
+    path = (
+        Waypoint(base, (0.0, 0.0, 0.3)),
+        Waypoint(base + 1),
+        Waypoint(pulley=2.0),
+        Waypoint(base + 1),
+        Waypoint(base, (1.0, 0.0, 0.0)),
+    )
+    s.more["spatial_tendons"] = (SpatialTendon("strung.string", path, **tendon),)
+    return s.world()
+
+
+def strung_length(position: Array) -> Array:
+    """[m] of the string of `strung` with its slider at positions of up to 1 m."""
+    return np.hypot(position, 0.3) + (1.0 - position) / 2
 
 
 def hung(kind: ConstraintKind, angle: float = 0.1, dt: float = 0.001) -> World:

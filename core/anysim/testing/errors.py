@@ -14,7 +14,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability as C
-from anysim.model.world import Box, ContactSensor, ControlMode, Cylinder, Sphere, Surface
+from anysim.model.world import Box, Compliance, ContactSensor, ControlMode, Cylinder, Sphere, Surface
 from anysim.testing import coupled, drive_errors as drives, tolerances, worlds
 from anysim.testing.compare import sliding_friction
 from anysim.testing.drive_errors import Build
@@ -167,6 +167,17 @@ def torsion(build: Build) -> float:
     return abs(lost / (0.01 * G / moment * 0.2) - 1)
 
 
+def unyielding(build: Build) -> float:
+    """Relative, on how deep a ball sinks that gives way with a given stiffness: g (1 - d) / k, 5 mm."""
+    given, share = 981.0, 0.5
+    compliance = Compliance((-given, -60.0), (share, share, 0.001, 0.5, 2.0))
+    world = worlds.resting(Sphere(0.1), 0.1)
+    surface = Surface(compliance=compliance)
+    engine = build(replace(world, geoms=tuple(replace(geom, surface=surface) for geom in world.geoms)))
+    engine.step(1500)
+    return abs((0.1 - float(_heights(engine)[0])) / (G * (1 - share) / given) - 1)
+
+
 def felt(build: Build) -> float:
     """Relative to the weight: the force that a sensor reads on a box at rest on a slope of 20 degrees."""
     world = replace(worlds.slope(radians(20), 0.8), contact_sensors=(ContactSensor("box", (1,)),))
@@ -205,6 +216,7 @@ MEASURES: Mapping[str, Measure] = {
         (dead, C.RESTITUTION, tolerances.RESTITUTION["exact"]),
         (dent, C.RESTITUTION, tolerances.DENT),
         (torsion, C.TORSIONAL_FRICTION, tolerances.SLIDING),
+        (unyielding, C.COMPLIANCE, tolerances.SLIDING),
         (felt, C.CONTACT_SENSORS, tolerances.WEIGHT),
         (shift, C.VARYING_ENTITIES, tolerances.ABSENT),
         (coupled.apart, C.CONNECTS, tolerances.HELD),

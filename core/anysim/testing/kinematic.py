@@ -77,6 +77,8 @@ class NullEngine(SimEngine):
                     C.JOINT_SPRINGS,
                     C.TENDONS,
                     C.TENDON_LIMITS,
+                    C.SPATIAL_TENDONS,
+                    C.COMPLIANCE,
                     C.ARMATURE,
                     C.EFFORT_LIMITS,
                     C.ACTUATION_EXPLICIT,

@@ -115,6 +115,32 @@ def test_a_drive_pulls_at_all_joints_of_its_tendon(build):
     assert_close(engine.get_state().joint_pos[0], wanted, tolerances.AT_REST, "positions at rest")
 
 
+@needs(C.SPATIAL_TENDONS)
+def test_a_string_through_space_pulls_by_its_length(build):
+    """Energy is that of the string's length, pulley and all; a string that is limited keeps its length."""
+    stiffness, rest = 80.0, 0.6
+    engine = build(coupled.strung(stiffness=stiffness, rest=(rest, rest)))
+    places, speeds = [], []
+    for _ in range(1500):
+        engine.step()
+        state = engine.get_state()
+        places.append(float(state.joint_pos[0, 0]))
+        speeds.append(float(state.joint_vel[0, 0]))
+    place, speed = np.array(places), np.array(speeds)
+    assert np.ptp(place) > 0.1
+    energy = 0.5 * coupled.MASSES[0] * speed**2 + 0.5 * stiffness * (coupled.strung_length(place) - rest) ** 2
+    start = 0.5 * stiffness * (coupled.strung_length(np.array(0.4)) - rest) ** 2
+    assert_close(energy, np.full(len(energy), start), tolerances.ENERGY * start, "energy over 1.5 s")
+    most = float(coupled.strung_length(np.array(0.5)))
+    engine = build(coupled.strung(upper=most))
+    engine.set_joint_state(position=[0.4], velocity=[0.5])
+    longest = 0.0
+    for _ in range(600):
+        engine.step()
+        longest = max(longest, float(coupled.strung_length(engine.get_state().joint_pos[0, 0])))
+    assert abs(longest - most) < tolerances.LIMIT, longest
+
+
 @needs(C.MIMIC_CURVES)
 def test_a_joint_follows_a_curve(build):
     """A follower is where the polynomial puts it, when its leader is written and in motion."""

@@ -15,6 +15,7 @@ from anysim.model.world import (
     BodyKind,
     Box,
     Capsule,
+    Compliance,
     ControlMode,
     Cylinder,
     Geom,
@@ -202,10 +203,14 @@ class _Mjcf:
     def _surface(self, made: Any, surface: Surface, name: str) -> None:
         friction = (surface.friction, surface.torsional_friction, surface.rolling_friction)
         made.set("friction", numbers(friction))
-        made.set("condim", "4" if surface.torsional else "3")
-        made.set("solimp", numbers((*surface.impedance, 0.001, 0.5, 2.0)))
-        if surface.softness:
-            made.set("solref", f"{number(surface.softness)} 1")
+        own = surface.compliance or Compliance()
+        made.set("condim", str(own.dimensions or (4 if surface.torsional else 3)))
+        made.set("solimp", numbers(own.impedance or (*surface.impedance, 0.001, 0.5, 2.0)))
+        if own.reference or surface.softness:
+            made.set("solref", numbers(own.reference or (surface.softness, 1.0)))
+        for key, value, usual in (("margin", own.margin, 0.0), ("gap", own.gap, 0.0), ("solmix", own.weight, 1.0)):
+            if value != usual:
+                made.set(key, number(value))
         if surface.priority:
             made.set("priority", str(surface.priority))
         if surface.restitution:

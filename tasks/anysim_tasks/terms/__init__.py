@@ -1,6 +1,6 @@
 """Terms for whole families of tasks: velocities and gaits of bases, `tasks.coverage`, `tasks.latch`, `tasks.spring`."""
 
-from anysim_tasks.terms import base_motion, gait
+from anysim_tasks.terms import base_motion, gait, generalized
 from anysim_tasks.terms.bounded import at_least
 from anysim_tasks.terms.climb import Climb
 from anysim_tasks.terms.coverage import Coverage, CoverageGain
@@ -10,7 +10,13 @@ from anysim_tasks.terms.spring import Spring
 from anysim_tasks.terms.velocity import Tracked, Velocity, at_velocity, goal_velocity, velocity_match
 
 TERMS = {
-    "observation": {"clock": gait.clock, "goal_velocity": goal_velocity},
+    "observation": {
+        "clock": gait.clock,
+        "generalized_force": generalized.generalized_force,
+        "generalized_position": generalized.generalized_position,
+        "generalized_velocity": generalized.generalized_velocity,
+        "goal_velocity": goal_velocity,
+    },
     "reward": {
         "ang_vel_xy_l2": base_motion.ang_vel_xy_l2,
         "at_least": at_least,
@@ -19,6 +25,7 @@ TERMS = {
         "effort_share_l2": base_motion.EffortShareL2,
         "feet_slide": gait.feet_slide,
         "flat_orientation_l2": base_motion.flat_orientation_l2,
+        "forward_speed": generalized.forward_speed,
         "gait_contact": gait.gait_contact,
         "joint_deviation_l2": base_motion.JointDeviationL2,
         "lin_vel_z_l2": base_motion.lin_vel_z_l2,

@@ -203,7 +203,7 @@ def test_options_that_do_not_exist(make, worlds):
     with pytest.raises(EngineError, match=r"no option 'thread'; did you mean 'threads'"):
         make(worlds.ball(), thread=2)
     with pytest.raises(EngineError, match="options of mujoco"):
-        make(worlds.ball(), integrator="rk4")
+        make(worlds.ball(), integrator="leapfrog")
 
 
 def test_a_crowd_asks_for_the_memory_that_it_takes(make):

@@ -21,7 +21,7 @@ WHOLE = """<mujoco><compiler angle="radian"/><asset>
 <body name="base" pos="0 0 1"><geom name="trunk" type="box" size="0.1 0.1 0.1" pos="0 0 0.1" quat="1 0 0 0"
     friction="1 0.005 0.0001"
   density="1000" material="red" condim="3" contype="1" conaffinity="1" priority="0" solref="0.03 1"
-    solimp="0.9 0.95 0.001"/>
+    solimp="0.9 0.95 0.001" margin="0.01" gap="0.02" solmix="2"/>
   <geom name="tool" type="mesh" mesh="wedge" mass="1" rgba="1 0 0 1" pos="3 0 0"/><geom type="hfield"
     hfield="hill" pos="0 5 0"/>
   <geom name="rod" type="capsule" fromto="0 0 0 0 0 1" size="0.1" shellinertia="false" axisangle="0 0 1 0"/>
@@ -30,18 +30,25 @@ WHOLE = """<mujoco><compiler angle="radian"/><asset>
     diaginertia="0.1 0.2 0.25"/>
     <joint name="turn" type="hinge" pos="0 0 0.1" axis="0 0 1" range="-1 1" limited="true" armature="0.1"
     damping="1" frictionloss="0.1"
-      ref="0.1" springref="0.2" stiffness="2" actuatorfrclimited="true" actuatorfrcrange="-5 5" solreflimit="0.03 1"/>
+      ref="0.1" springref="0.2" stiffness="2" actuatorfrclimited="true" actuatorfrcrange="-5 5" solreflimit="0.03 1"
+    solimplimit="0.8 0.9 0.01" margin="0.01" solreffriction="0.03 1" solimpfriction="0.8 0.9 0.01"/>
     <geom name="fist" size="0.1"/>
-    <site name="tip" pos="0 0 0.1" quat="1 0 0 0"/><site name="line" type="capsule" size="0.1"
+    <site name="tip" pos="0 0 0.1" quat="1 0 0 0"/><site name="far" pos="1 1 0"/><site name="line"
+    type="capsule" size="0.1"
     fromto="0 0 0 0 0 1"/>
     <body name="hand" pos="0 1 0" euler="0 0 0.1"><inertial pos="0 0 0" mass="1" fullinertia="0.1 0.2 0.25 0 0 0"/>
       <joint name="grip" springdamper="0.1 1" range="-2 2"/><geom name="nail" size="0.1"
     pos="0 0 1"/></body></body></body></worldbody>
-<equality><weld body1="hand" body2="base" anchor="0 0 0.1" relpose="0 0 0 1 0 0 0" solref="0.03 1"/>
+<equality><weld body1="hand" body2="base" anchor="0 0 0.1" relpose="0 0 0 1 0 0 0" solref="0.03 1"
+    solimp="0.8 0.9 0.01" torquescale="2"/>
   <joint name="tie" joint1="grip" joint2="turn" polycoef="0 1 0 0 0" active="true"/></equality>
 <tendon><fixed name="cord" stiffness="4" damping="1" springlength="0.1 0.2" range="-1 1"
   limited="true" frictionloss="0.1" armature="0.1"
-  solreflimit="0.03 1"><joint joint="turn" coef="0.5"/><joint joint="grip" coef="2"/></fixed></tendon>
+  solreflimit="0.03 1" solimplimit="0.8 0.9 0.01" margin="0.01" solreffriction="0.03 1"
+    solimpfriction="0.8 0.9 0.01"><joint joint="turn" coef="0.5"/><joint joint="grip" coef="2"/></fixed>
+  <spatial stiffness="1" damping="1"><site site="tip"/><geom geom="nail" sidesite="line"/><site site="line"/>
+    <pulley divisor="2"/>
+    <site site="tip"/><site site="line"/></spatial></tendon>
 <actuator><position name="p" joint="turn" kp="50" kv="5" gear="1" forcelimited="true" forcerange="-9 9"/>
   <general name="g" joint="grip" gaintype="fixed" gainprm="5" biastype="affine" biasprm="0 -5 -1" dyntype="none"
     ctrllimited="true"
@@ -57,7 +64,7 @@ actuatorfrclimited: false; forcelimited: false; ctrllimited: false; active: fals
 joint2: grip; joint: hand; gaintype: affine; biastype: none; dyntype: integrator; shellinertia: true; axis: 0 1 0;
 pos: 0.1 0.2 0.3; refpos: 0.1 0.2 0.3; fromto: 0 0 0 0 1 1; stiffness: 3; polycoef: 0.1 2 0 0 0; ref: 0.3;
 nrow: 4; ncol: 1; elevation: 1 0 0 0.5; angle: degree; solreflimit: 0.06 1; solref: 0.06 1;
-body1: arm; body2: arm; relpose: 0 0 0 0 1 0 0""".split(";")
+site: far; sidesite: far; geom: fist; body1: arm; body2: arm; relpose: 0 0 0 0 1 0 0""".split(";")
     for key, value in [pair.split(":")]
 }
 """Other values than those of the model; numbers are scaled where there is none."""
@@ -74,7 +81,7 @@ def model_of(root: ElementTree.Element, folder: Path) -> str:
     fields = [(field.name, field.size, field.heights.tolist()) for field in model.heightfields]
     geoms = [(geom, None) for geom in model.geoms]
     meshes = [(mesh.name.rpartition("_")[0], mesh.vertices.tolist()) for mesh in model.meshes]
-    held = (model.tendons, model.constraints, model.actuator_hints, model.excluded_pairs)
+    held = (model.tendons, model.spatial_tendons, model.constraints, model.actuator_hints, model.excluded_pairs)
     parts = (model.bodies, model.joints, geoms, model.sites, meshes, fields, held)
     return repr((*parts, [str(note) for note in model.report]))
 
@@ -111,7 +118,7 @@ def test_the_model_has_what_the_table_reads() -> None:
     given = {key for _, key in ATTRIBUTES} | {"xyaxes", "zaxis", "builtin", "params", "vertex"}
     elsewhere = set(
         "actdim actlimited actrange body class content_type cranksite dampratio dynprm file inertial input "
-        "jointinparent name normal site tendon texcoord timeconst velrange".split()
+        "jointinparent name normal tendon texcoord timeconst velrange".split()
     )
     rows = [row for row in coverage.rows() if row[2] in (Fate.EXACT, Fate.APPROXIMATED)]
     missing = {name.rpartition("/")[2] for _, names, *_ in rows for name in names.split()} - given - elsewhere

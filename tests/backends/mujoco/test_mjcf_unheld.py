@@ -42,7 +42,7 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
 @pytest.mark.parametrize(
     ("place", "text", "words"),
     [
-        ("option", 'density="1.2"', "option density: 1.2 is left out: there is no fluid"),
+        ("option", 'density="1.2"', "option density: 1.2 is left out: `engine.options` of MuJoCo has them"),
         ("option", 'viscosity="1e-5"', "option viscosity: 1e-05 is left out"),
         ("option", 'wind="0 1 0"', "option wind: 0 1 0 is left out"),
         ("option", 'gravity="0 0 -1"', "option gravity: 0 0 -1 is left out: the world's `physics` has it"),
@@ -57,14 +57,6 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
         ("flag", '<flag override="enable"/>', "option flag enable: override"),
         ("rest", '<contact><pair name="p" geom1="trunk" geom2="fist"/></contact>', "pairs: are left out"),
         ("trunk", 'contype="2" conaffinity="4"', "geom contype: 2 and conaffinity 4 hold inside of the model"),
-        ("trunk", 'condim="1"', "geom condim: contacts have friction where either surface has"),
-        ("trunk", 'condim="6"', "geom condim: rolling friction is not simulated on every engine"),
-        ("rod", 'margin="0.002"', "geom margin: 0.002 is left out: contacts begin where surfaces touch (1: rod)"),
-        ("rod", 'solref="0.02 0.5"', "geom solref: the damping ratio of 0.5 is left out"),
-        ("rod", 'solref="-100 -5"', "geom solref: -100 -5 is a stiffness and a damping, and left out"),
-        ("rod", 'solimp="0.9 0.95 0.01"', "geom solimp: its width, midpoint and power are left out"),
-        ("joint", 'range="-9 9" solreflimit="0.02 0.7"', "joint solref_limit: the damping ratio of 0.7 is left out"),
-        ("joint", 'range="-9 9" solimplimit="0.5 0.6"', "joint solimp_limit: 0.5 0.6"),
         ("joint", 'range="10 90"', "turn: starts at 0, outside of [0.174533, 1.5708]; now at the limit (repaired)"),
         ("joint", 'damping="0.1 0.2 0.3"', "joint damping: is a polynomial; its linear part alone is kept"),
         ("joint", 'actuatorfrcrange="-1 5"', "joint actfrcrange: [-1, 5] is one-sided; the larger end limits both"),
@@ -89,12 +81,6 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
         ),
         ("rest", '<actuator><position joint="turn" kp="1" delay="0.1" nsample="9"/></actuator>', "actuator delay: 0.1"),
         ("rest", '<equality><joint joint1="grip" active="false"/></equality>', "equality active: is inactive"),
-        ("rest", '<equality><joint joint1="grip" joint2="turn" solref="0.1 1"/></equality>', "equality solref: 0.1 1"),
-        (
-            "rest",
-            '<equality><weld body1="arm" body2="base" torquescale="0.5"/></equality>',
-            "equality data: the torquescale of 0.5 is left out",
-        ),
         ("world", '<site name="goal"/>', "world: 1 sites of the world beside the model are left out"),
         ("base", 'mocap="true"', "body mocap: True is left out: it stays where it is"),
         ("rest", '<custom><numeric name="n" data="1"/></custom>', "numerics: are left out"),
@@ -136,13 +122,8 @@ def actuators(*drives: str) -> str:
         ),
         ("rod", 'solref="0 1"', ["geom solref: 0 1 mixes two forms: the default holds, as in MuJoCo"]),
         ("rod", 'solref="0.1 -1"', ["geom solref: 0.1 -1 mixes two forms"]),
-        ("joint", 'solreflimit="0.1 0.5"', []),
         ("joint", 'solimplimit="0.5 0.6"', []),
-        ("joint", 'margin="0.1"', []),
-        ("joint", 'solreffriction="0.1 0.5"', []),
-        ("joint", 'solimpfriction="0.5 0.6"', []),
-        ("joint", 'frictionloss="1" solreffriction="0.1 0.5"', ["joint solref_friction: 0.1 0.5 is left out"]),
-        ("joint", 'range="-9 9" margin="0.1"', ["joint margin: 0.1 is left out: limits act at the limit"]),
+        ("joint", 'frictionloss="1" solreffriction="0.1 -1"', ["joint solref_friction: 0.1 -1 mixes two forms"]),
     ],
 )
 def test_notes_say_what_happens(load: Callable[..., ImportedModel], place: str, text: str, notes: list[str]) -> None:
@@ -181,10 +162,10 @@ def test_a_mixed_solref_is_as_soft_as_the_default(load: Callable[..., ImportedMo
 
 
 def test_defaults_count_where_they_are_used(load: Callable[..., ImportedModel]) -> None:
-    """A class sets a margin; two geoms are of it, of which one says otherwise."""
-    model = load(default='<geom margin="0.001"/>', trunk='class="soft"', rod='class="soft" margin="0"')
+    """A class sets a number of a program's own; two geoms are of it, of which one says otherwise."""
+    model = load(default='<geom adhesion="0.5"/>', trunk='class="soft"', rod='class="soft" adhesion="0"')
     assert [str(note) for note in model.report] == [
-        "geom margin: 0.001 is left out: contacts begin where surfaces touch (1: trunk) (dropped)"
+        "geom adhesion: 0.5 is left out: surfaces do not stick (1: trunk) (dropped)"
     ]
 
 
@@ -308,14 +289,13 @@ TENDONS = """<tendon><fixed name="look"><joint joint="turn" coef="1"/></fixed>
 <actuator><motor name="winch" tendon="haul"/></actuator><equality><tendon tendon1="tied"/></equality>"""
 
 
-def test_tendons_that_are_left_out_are_named_with_their_effect(load: Callable[..., ImportedModel]) -> None:
-    """Those of joints are in the model, but for one that only measures; one through space is left out."""
+def test_tendons_that_only_measure_are_left_out(load: Callable[..., ImportedModel]) -> None:
+    """All others are in the model, also one through space between what is fixed to the file's world."""
     model = load(rest=TENDONS, world='<site name="near"/><site name="far" pos="1 0 0"/>')
     assert [str(note) for note in model.report if note.where == "tendons"] == [
-        "tendons: do nothing in the file either: they only measure (1: look) (info)",
-        "tendons: pull as springs, which is left out: they are paths through space, and tendons here are sums of joint "
-        "positions (1: cord) (dropped)",
+        "tendons: do nothing in the file either: they only measure (1: look) (info)"
     ]
     assert [tendon.name for tendon in model.tendons] == ["pull", "stop", "tied"]
     assert (model.tendons[2].lower, model.tendons[2].upper) == (0.0, 0.0)
+    assert [tendon.name for tendon in model.spatial_tendons] == ["cord"]
     assert [hint.joint for hint in model.actuator_hints] == [0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anysim.model.world import Body, BodyKind, Box, Geom, Inertial, Plane, Surface, World
-from anysim_mujoco.surfaces import damping_ratio, rebound
+from anysim_mujoco.mjcf.surfaces import damping_ratio, rebound
 
 
 @pytest.mark.parametrize("restitution", [0.05, 0.1353, 0.3, 0.5, 0.9, 0.99])

@@ -106,6 +106,7 @@ ROWS: dict[str, Row] = {
     "ReliefSpec.platform": relief("rough", "platform=1.0"),
     "TerrainSpec.kind": row("world.terrain.kind=none"),
     "TerrainSpec.friction": row("world.terrain.friction=0.3"),
+    "TerrainSpec.margin": row("world.terrain.margin=0.01"),
     "TerrainSpec.restitution": row("world.terrain.restitution=0.3"),
     "TerrainSpec.color": row("world.terrain.color=red"),
     "TerrainSpec.heights": ground("heights=[[0, 1], [0, 0]]", kind="heightfield", heights="[[0, 0], [0, 1]]"),

@@ -1,4 +1,4 @@
-"""Fixed tendons and equalities of an MJCF file, as tendons, constraints and mimic joints of the neutral model.
+"""Tendons and equalities of an MJCF file, as tendons, constraints and mimic joints of the neutral model.
 
 MuJoCo measures equalities of joints and tendons from the file's reference positions; positions here begin at the file's
 zero, so that polynomials are expanded about it.
@@ -16,9 +16,20 @@ from anysim.conventions import WORLD, Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
 from anysim.model.hash import split
-from anysim.model.world import Constraint, ConstraintKind, Mimic, Tendon
+from anysim.model.world import (
+    Compliance,
+    Constraint,
+    ConstraintKind,
+    Mimic,
+    SpatialTendon,
+    Tendon,
+    Vec3,
+    Waypoint,
+    Wrap,
+)
+from anysim_mujoco.mjcf.compliance import constraint_compliance, softness
 from anysim_mujoco.mjcf.geoms import pose_of
-from anysim_mujoco.mjcf.unheld import mixed, tendon_effects
+from anysim_mujoco.mjcf.unheld import tendon_effects
 
 _JOINT_WRAP = int(mujoco.mjtWrap.mjWRAP_JOINT)
 
@@ -28,6 +39,7 @@ class Following(NamedTuple):
 
     follower: int
     mimic: Mimic
+    compliance: Compliance | None
 
 
 class Couplings:
@@ -41,13 +53,15 @@ class Couplings:
         unit: Callable[[int], float],
         frames: Mapping[int, tuple[int, Array]],
         floating: bool,
+        origin: Array,
     ) -> None:
         """With neutral joints and what lengths along them are scaled with by MuJoCo joint (`number`, `unit`).
 
-        `frames` has by MuJoCo body the neutral one and the pose in it; `floating`: whether the root moves freely.
+        `frames` has by MuJoCo body the neutral one and the pose in it; `floating`: whether the root moves freely, else
+        `origin` (7,) is that of the file in it.
         """
         self.model, self.scale, self.number, self.unit = model, scale, number, unit
-        self.frames, self.floating = frames, floating
+        self.frames, self.floating, self.origin = frames, floating, origin
 
     # ------------------------------------------------------------------ tendons
 
@@ -62,36 +76,97 @@ class Couplings:
 
     def tendons(self) -> Iterator[Tendon]:
         """The fixed tendons that pull, damp, limit, or hold more than two joints."""
+        held = self._held()
+        for t in range(self.model.ntendon):
+            joints, coefficients = self.path(t)
+            if not joints or not (t in held or set(tendon_effects(self.model, t)) & _HELD):
+                continue
+            unit = self.scale if all(self.unit(j) == self.scale for j in joints) else 1.0
+            yield Tendon(
+                joints=tuple(self.number[j] for j in joints),
+                coefficients=tuple(c * unit / self.unit(j) for j, c in zip(joints, coefficients, strict=True)),
+                **self._common(t, held.get(t), unit),
+            )
+
+    def spatial_tendons(self) -> Iterator[SpatialTendon]:
+        """Those through space that pull, damp, limit or hold."""
+        held = self._held()
+        for t in range(self.model.ntendon):
+            if not self.path(t)[0] and (t in held or set(tendon_effects(self.model, t)) & _HELD):
+                yield SpatialTendon(path=tuple(self._points(t)), **self._common(t, held.get(t), self.scale))
+
+    def _held(self) -> dict[int, int]:
+        """The equalities that hold a tendon's length, by the tendon."""
         model = self.model
-        held = {
+        return {
             int(model.eq_obj1id[e]): e
             for e in range(model.neq)
             if model.eq_type[e] == mujoco.mjtEq.mjEQ_TENDON and model.eq_active0[e] and model.eq_obj2id[e] < 0
             if not self._ties_two(int(model.eq_obj1id[e]))
         }
-        for t in range(model.ntendon):
-            joints, coefficients = self.path(t)
-            if not joints or not (t in held or set(tendon_effects(model, t)) & _HELD):
-                continue
-            unit = self.scale if all(self.unit(j) == self.scale for j in joints) else 1.0
-            lower, upper = (float(v) * unit for v in model.tendon_range[t]) if model.tendon_limited[t] else (-inf, inf)
-            if t in held:
-                lower = upper = float(model.tendon_length0[t] + model.eq_data[held[t], 0]) * unit
-            softness = _softness(model.eq_solref[held[t]] if t in held else model.tendon_solref_lim[t])
-            short, long = (float(v) * unit for v in model.tendon_lengthspring[t])
-            yield Tendon(
-                name=model.tendon(t).name or f"tendon{t}",
-                joints=tuple(self.number[j] for j in joints),
-                coefficients=tuple(c * unit / self.unit(j) for j, c in zip(joints, coefficients, strict=True)),
-                stiffness=float(model.tendon_stiffness[t]),
-                damping=float(model.tendon_damping[t]),
-                rest=(short, long),
-                lower=lower,
-                upper=upper,
-                friction=float(model.tendon_frictionloss[t]),
-                armature=float(model.tendon_armature[t]),
-                limit_softness=softness,
+
+    def _common(self, t: int, held: int | None, unit: float) -> dict[str, Any]:
+        """What all tendons have; `held` is the equality that holds it."""
+        model = self.model
+        lower, upper = (float(v) * unit for v in model.tendon_range[t]) if model.tendon_limited[t] else (-inf, inf)
+        if held is not None:
+            lower = upper = float(model.tendon_length0[t] + model.eq_data[held, 0]) * unit
+            ends = model.eq_solref[held], model.eq_solimp[held], 0.0
+        else:
+            ends = model.tendon_solref_lim[t], model.tendon_solimp_lim[t], float(model.tendon_margin[t])
+        dry = constraint_compliance(model.tendon_solref_fri[t], model.tendon_solimp_fri[t], unit=unit)
+        short, long = (float(v) * unit for v in model.tendon_lengthspring[t])
+        return {
+            "name": model.tendon(t).name or f"tendon{t}",
+            "stiffness": float(model.tendon_stiffness[t]),
+            "damping": float(model.tendon_damping[t]),
+            "rest": (short, long),
+            "lower": lower,
+            "upper": upper,
+            "friction": float(model.tendon_frictionloss[t]),
+            "armature": float(model.tendon_armature[t]),
+            "limit_softness": softness(ends[0]),
+            "limit_compliance": constraint_compliance(*ends, unit=unit) if lower > -inf or upper < inf else None,
+            "friction_compliance": dry if model.tendon_frictionloss[t] else None,
+        }
+
+    def _points(self, t: int) -> Iterator[Waypoint]:
+        """The path of a spatial tendon."""
+        model, first = self.model, int(self.model.tendon_adr[t])
+        for w in range(first, first + int(model.tendon_num[t])):
+            kind, thing = int(model.wrap_type[w]), int(model.wrap_objid[w])
+            if kind == int(mujoco.mjtWrap.mjWRAP_PULLEY):
+                yield Waypoint(pulley=float(model.wrap_prm[w]))
+            elif kind == int(mujoco.mjtWrap.mjWRAP_SITE):
+                yield Waypoint(*self._site(thing))
+            else:
+                own = pose_of(model.geom_pos[thing], model.geom_quat[thing], self.scale)
+                body, frame = self._place(int(model.geom_bodyid[thing]), own)
+                position, quaternion = split(frame)
+                side = int(model.wrap_prm[w])
+                side_body, point = self._site(side) if side >= 0 else (WORLD, None)
+                radius = float(model.geom_size[thing, 0]) * self.scale
+                cylinder = kind == int(mujoco.mjtWrap.mjWRAP_CYLINDER)
+                yield Waypoint(body, position, Wrap(radius, cylinder, quaternion, point, side_body))
+
+    def _site(self, s: int) -> tuple[int, Vec3]:
+        own = pose_of(self.model.site_pos[s], self.model.site_quat[s], self.scale)
+        body, frame = self._place(int(self.model.site_bodyid[s]), own)
+        return body, split(frame)[0]
+
+    def _place(self, number: int, local: Array) -> tuple[int, Array]:
+        """The neutral body of a MuJoCo body, and a pose (7,) of that in it.
+
+        Raises:
+            AssetError: a string ties a model that floats to the world, whose place in it is the world's.
+        """
+        if number == 0 and self.floating:
+            raise AssetError(
+                "a spatial tendon ties it to the world, and the model floats: where it stands is the world's to say; "
+                "leave the tendon out"
             )
+        body, frame = self.frames[number] if number else (0, self.origin)
+        return body, P.compose(frame, local)
 
     # ------------------------------------------------------------------ joints that follow others
 
@@ -124,7 +199,8 @@ class Couplings:
             if found is not None:
                 follower, leader, curve = found
                 followers.add(self.number[follower])
-                yield Following(self.number[follower], self._mimic(follower, leader, curve))
+                tie = constraint_compliance(model.eq_solref[e], model.eq_solimp[e], unit=self.unit(follower))
+                yield Following(self.number[follower], self._mimic(follower, leader, curve), tie)
 
     def _ties_two(self, t: int) -> bool:
         """Whether tendon `t` is one of two joints: an equality of it makes one of them follow the other."""
@@ -133,9 +209,7 @@ class Couplings:
 
     def untied(self, e: int) -> str:
         """Why the equality of tendons `e` is left out; empty where it is not."""
-        if self.model.eq_obj2id[e] >= 0:
-            return "ties two tendons"
-        return "" if self.path(int(self.model.eq_obj1id[e]))[0] else "holds a spatial tendon"
+        return "ties two tendons" if self.model.eq_obj2id[e] >= 0 else ""
 
     def _mimic(self, follower: int, leader: int, curve: Polynomial) -> Mimic:
         own, unit = self.unit(follower), self.unit(leader)
@@ -165,7 +239,18 @@ class Couplings:
             (body, frame), (other, other_frame) = (self._end(e, side, kind, name) for side in (0, 1))
             if body == WORLD:
                 (body, frame), (other, other_frame) = (other, other_frame), (body, frame)
-            yield Constraint(name, kind, body, other, *split(frame), *split(other_frame), _softness(model.eq_solref[e]))
+            scale = float(model.eq_data[e, 10]) if kind is ConstraintKind.WELD else 1.0
+            yield Constraint(
+                name,
+                kind,
+                body,
+                other,
+                *split(frame),
+                *split(other_frame),
+                softness(model.eq_solref[e]),
+                constraint_compliance(model.eq_solref[e], model.eq_solimp[e], unit=self.scale),
+                scale if scale == 1.0 else scale * self.scale,
+            )
 
     def _end(self, e: int, side: int, kind: ConstraintKind, name: str) -> tuple[int, Array]:
         """The neutral body of one side of an equality, and the frame in it that is held."""
@@ -185,15 +270,8 @@ class Couplings:
                 f"the equality '{name}' is a {kind} to the world, and the model floats: where it stands is the world's "
                 f"to say; fix it with `base: fixed` in place of the equality, or leave that out"
             )
-        number, frame = self.frames[body] if body else (0, _IDENTITY)
+        number, frame = self.frames[body] if body else (0, self.origin)
         return number, P.compose(frame, local)
 
 
-_IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _HELD = {"pull as springs", "damp", "rub", "add inertia", "limit a length"}
-
-
-def _softness(solref: Any) -> float:
-    """The time constant [s] that a file gives a limit or an equality; 0 where it gives none, or a stiffness."""
-    constant = 0.0 if mixed(solref) else float(solref[0])
-    return constant if constant > 0 and abs(constant - 0.02) > 1e-9 else 0.0

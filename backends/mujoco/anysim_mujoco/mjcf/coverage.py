@@ -20,8 +20,10 @@ class Row(NamedTuple):
 
 
 _EXACT, _ABOUT, _NOT, _OUT, _IDLE = Fate
-_POSE, _FLUID, _WORLD = "pos quat alt", "there is no fluid", "the world's `physics` has it"
-_TOUCH, _NUMBERS = "contacts begin where surfaces touch", "numbers of a program's own"
+_POSE, _WORLD = "pos quat alt", "the world's `physics` has it"
+_FLUID = "shapes are dragged by their inertia alone"
+_NUMBERS = "numbers of a program's own"
+_MIXED = "one that mixes a time constant and a damping is MuJoCo's default, as in MuJoCo"
 _LAWS = "a motor, position or velocity drive of one hinge or slide becomes a drive; others are left out"
 
 FIELDS: Mapping[str, tuple[Row, ...]] = {
@@ -37,11 +39,9 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_EXACT, "type pos axis range limited armature frictionloss ref actfrclimited springdamper springref"),
         Row(_ABOUT, "damping", "the linear part of a polynomial; none of a free joint"),
         Row(_ABOUT, "actfrcrange", "the larger end limits both"),
-        Row(_ABOUT, "solref_limit", "its time constant"),
+        Row(_EXACT, "solimp_limit margin solimp_friction", "as the compliance of a limit and of dry friction"),
+        Row(_ABOUT, "solref_limit solref_friction", _MIXED),
         Row(_ABOUT, "stiffness", "the linear part of a polynomial; none of a free joint"),
-        Row(_OUT, "solimp_limit", "limits are as soft as the engine has them"),
-        Row(_OUT, "margin", "limits act at the limit"),
-        Row(_OUT, "solref_friction solimp_friction", "dry friction is as stiff as the engine has it"),
         Row(_OUT, "actgravcomp", "a compensated weight is no load of a drive"),
         Row(_OUT, "userdata", _NUMBERS),
         Row(_IDLE, "align", "it is of how MuJoCo computes"),
@@ -51,12 +51,9 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_ABOUT, "type", "an ellipsoid becomes a convex mesh; a plane on a body is left out"),
         Row(_ABOUT, "meshname", "what collides is the convex hull of the mesh, of at most 64 corners"),
         Row(_ABOUT, "material", "its colour"),
-        Row(_ABOUT, "condim", "a frictionless contact has the friction of the pair, and nothing resists rolling"),
+        Row(_EXACT, "condim solimp margin gap solmix", "as the compliance of its contacts"),
         Row(_ABOUT, "contype conaffinity", "pairs of bodies of the model; it meets all that is not of it"),
-        Row(_ABOUT, "solref", "its time constant"),
-        Row(_ABOUT, "solimp", "its first two numbers"),
-        Row(_OUT, "margin gap", _TOUCH),
-        Row(_OUT, "solmix", "contacts mix by the pair rule"),
+        Row(_ABOUT, "solref", _MIXED),
         Row(_OUT, "fluid_ellipsoid fluid_coefs", _FLUID),
         Row(_OUT, "surfacevel", "surfaces do not move by themselves"),
         Row(_OUT, "adhesion", "surfaces do not stick"),
@@ -90,23 +87,20 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_IDLE, "texrepeat texuniform textures", "textures are left out with a note of their own"),
     ),
     "tendon": (
-        Row(_EXACT, "path springlength range limited frictionloss armature", "of a fixed one"),
-        Row(_ABOUT, "stiffness damping", "the linear part of a polynomial, of a fixed one"),
-        Row(_ABOUT, "solref_limit", "its time constant"),
-        Row(_OUT, "solimp_limit", "limits are as soft as the engine has them"),
-        Row(_OUT, "margin", "limits act at the limit"),
-        Row(_OUT, "solref_friction solimp_friction", "dry friction is as stiff as the engine has it"),
+        Row(_EXACT, "path springlength range limited frictionloss armature"),
+        Row(_ABOUT, "stiffness damping", "the linear part of a polynomial"),
+        Row(_EXACT, "solimp_limit margin solimp_friction", "as the compliance of a limit and of dry friction"),
+        Row(_ABOUT, "solref_limit solref_friction", _MIXED),
         Row(_OUT, "actfrclimited actfrcrange", "each drive has a limit of its own"),
         Row(_OUT, "userdata", _NUMBERS),
         Row(_IDLE, "material rgba width", "it is of how a tendon is drawn"),
     ),
     "equality": (
         Row(_EXACT, "name1 name2"),
-        Row(_ABOUT, "data", "all but the `torquescale` of a weld"),
+        Row(_EXACT, "data solimp"),
         Row(_ABOUT, "type objtype", "those of joints and of tendons of two joints become mimic joints"),
         Row(_ABOUT, "active", "one that is not is left out"),
-        Row(_ABOUT, "solref", "the time constant of a connect or weld; followers are as stiff as the engine has them"),
-        Row(_OUT, "solimp", "what is held is as stiff as the engine has it"),
+        Row(_ABOUT, "solref", _MIXED),
     ),
     "actuator": (
         Row(_EXACT, "target forcelimited ctrllimited actdim actlimited actrange velrange ctrlspec gear"),
@@ -129,7 +123,7 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
     ),
     "option": (
         Row(_OUT, "timestep gravity cone impratio", _WORLD),
-        Row(_OUT, "density viscosity wind", _FLUID),
+        Row(_OUT, "density viscosity wind", "`engine.options` of MuJoCo has them: a fluid is its alone"),
         Row(_OUT, "magnetic", "there is no magnetic field"),
         Row(_OUT, "disableflags enableflags", "they are MuJoCo's alone"),
         Row(_OUT, "disableactuator", "drives have no groups"),
@@ -154,12 +148,12 @@ WHOLE: Mapping[str, Row] = {
     ),
     "exclude": Row(_ABOUT, "", "pairs of bodies, after those without a joint are joined to what carries them"),
     "ball": Row(_NOT, "", "as the `type` of a joint: there are hinges and slides"),
-    "connect weld": Row(
-        _EXACT, "", "but for a weld's `torquescale`; one of a model that floats to the world is refused"
-    ),
+    "connect weld": Row(_EXACT, "", "one of a model that floats to the world is refused"),
     "flex flexvert flexstrain flexcomp edge elasticity contact pin": Row(_NOT, "", "flexes: bodies are rigid"),
     "fixed": Row(_EXACT, "", "one that only measures does nothing, and is left out"),
-    "spatial pulley": Row(_OUT, "", "the report says what they do; one that only measures does nothing"),
+    "spatial pulley": Row(
+        _EXACT, "", "one of a model that floats to the world is refused; one that only measures is left out"
+    ),
     "general motor position velocity": Row(_ABOUT, "", _LAWS),
     "intvelocity orientation pid damper cylinder muscle adhesion dcmotor": Row(_OUT, "", _LAWS),
     "texture layer": Row(_OUT, "", "surfaces have plain colours"),
@@ -221,12 +215,12 @@ ATTRIBUTES: Mapping[str, str] = MappingProxyType(
         "usertet": "",
         "needsdf": "",
         "textures": "texture",
-        "tendon.path": "fixed/joint fixed/coef",
+        "tendon.path": "fixed/joint fixed/coef spatial/site spatial/geom spatial/sidesite pulley/divisor",
         "equality.name1": "joint1 name class",
         "equality.name2": "joint2",
         "equality.objtype": "",
         "equality.type": "",
-        "equality.data": "polycoef",
+        "equality.data": "polycoef torquescale",
         "actuator.target": "joint jointinparent tendon site body cranksite",
         "actuator.type": "",
         "actuator.trntype": "",

@@ -9,7 +9,7 @@ import numpy as np
 from anysim import cache
 from anysim.assets.meshes import hull_of, light_mesh
 from anysim.assets.model import ImportNote
-from anysim.conventions import Array, xyzw_from_wxyz
+from anysim.conventions import WORLD, Array, xyzw_from_wxyz
 from anysim.math import pose as P
 from anysim.model.hash import split
 from anysim.model.world import (
@@ -21,14 +21,14 @@ from anysim.model.world import (
     HeightFieldShape,
     Mesh,
     MeshShape,
+    Plane,
     Shape,
     Sphere,
     Surface,
 )
-from anysim_mujoco.mjcf.unheld import mixed
+from anysim_mujoco.mjcf.compliance import contact_compliance, softness
 
 _UNSET = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
-_SOFTNESS = 0.02  # MuJoCo's default time constant [s]; the neutral model leaves it to the engine
 
 
 def pose_of(position: Array, quaternion: Array, scale: float) -> Array:
@@ -55,14 +55,15 @@ class GeomReader:
         """The MuJoCo geom of each neutral one."""
 
     def read(self, link: str, number: int, body: int, pose: Array) -> None:
-        """Add the geoms of MuJoCo body `number`, whose frame has this pose (7,) in the neutral body."""
+        """Add the geoms of MuJoCo body `number`, which has this pose (7,) in the neutral body (-1: the world)."""
         model = self._model
         own = range(model.body_geomadr[number], model.body_geomadr[number] + model.body_geomnum[number])
         collides = {g: bool(model.geom_contype[g] or model.geom_conaffinity[g]) for g in own}
         shown = any(not collides[g] for g in own)
         for count, g in enumerate(own):
             where = f"geom '{model.geom(g).name or count}' of body '{link}'"
-            shape = self._shape(g, collides[g], where)
+            ground = body == WORLD and model.geom_type[g] == mujoco.mjtGeom.mjGEOM_PLANE
+            shape = Plane() if ground else self._shape(g, collides[g], where)
             if shape is None:
                 continue
             frame = P.compose(pose, pose_of(model.geom_pos[g], model.geom_quat[g], self._scale))
@@ -160,16 +161,15 @@ class GeomReader:
     def _surface(self, g: int) -> Surface:
         model = self._model
         sliding, torsional, rolling = (float(v) for v in model.geom_friction[g])
-        time_constant = float(model.geom_solref[g, 0])
-        custom = time_constant > 0 and not mixed(model.geom_solref[g]) and abs(time_constant - _SOFTNESS) > 1e-9
         return Surface(
             friction=sliding,
             torsional_friction=torsional,
             rolling_friction=rolling,
-            softness=time_constant if custom else 0.0,
+            softness=softness(model.geom_solref[g]),
             impedance=(float(model.geom_solimp[g, 0]), float(model.geom_solimp[g, 1])),
             priority=int(model.geom_priority[g]),
             torsional=int(model.geom_condim[g]) >= 4,
+            compliance=contact_compliance(model, g, self._scale),
         )
 
     def _note(self, kind: Literal["repaired", "dropped", "info"], where: str, message: str) -> None:

@@ -8,12 +8,12 @@ Rules where the neutral model is narrower; each use is a note in the report:
   and the body still collides with neither its parent nor what it did not collide with.
 - Sites and bodies share their names here: a site that is called like a body is found as `<body>.<site>`.
 - Joint positions keep the file's zero, whatever its `ref`. A keyframe `home` gives the initial ones.
-- Equalities of joints, and of tendons of two joints, become mimics, and a tendon of more is held. Spatial tendons, and
-  drives that are no position, velocity or motor drive of a joint or fixed tendon, are dropped. Ball joints and flexes
-  are refused.
+- Equalities of joints, and of tendons of two joints, become mimics, and a tendon of more is held. Drives that are no
+  position, velocity or motor drive of a joint or fixed tendon are dropped. Ball joints and flexes are refused.
+- Solver settings of contacts, limits, dry friction and ties are kept as their compliance where the file sets them.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -31,15 +31,16 @@ from anysim.errors import AssetError, listing
 from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.hash import split, tidy
-from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Site
+from anysim.model.world import Body, BodyKind, Geom, Inertial, Joint, JointType, Site
 from anysim_mujoco.inertia import full
+from anysim_mujoco.mjcf.compliance import constraint_compliance, softness
 from anysim_mujoco.mjcf.couplings import Couplings
 from anysim_mujoco.mjcf.drives import drive_hint, left_out, shared
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
 from anysim_mujoco.mjcf.pairs import PairReader
 from anysim_mujoco.mjcf.part import unqualified
-from anysim_mujoco.mjcf.unheld import mixed, of_tendons
+from anysim_mujoco.mjcf.unheld import of_tendons
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 JOINT_SHARE, _LIGHTEST = 1e-6, 1e-13
@@ -81,7 +82,7 @@ class _MjcfImport:
 
     def run(self, part: str = "") -> ImportedModel:
         self._refuse_the_unsayable()
-        top = 0 if part == PART else self._top(bool(part))
+        self.top = top = 0 if part == PART else self._top(bool(part))
         for number in range(top, self.model.nbody):
             self._body(number, top)
         self._sites()
@@ -92,7 +93,7 @@ class _MjcfImport:
             name=self.path.stem,
             bodies=tuple(self.bodies),
             joints=tuple(self.joints),
-            geoms=tuple(geometry.geoms),
+            geoms=tuple(self._of_parts(geometry)),
             geom_links=tuple(geometry.geom_links),
             sites=tuple(self.sites),
             meshes=tuple(geometry.meshes.values()),
@@ -104,6 +105,7 @@ class _MjcfImport:
             ),
             tendons=tuple(couplings.tendons()),
             constraints=tuple(couplings.constraints()),
+            spatial_tendons=tuple(couplings.spatial_tendons()),
             report=tuple(self.notes),
         )
 
@@ -135,11 +137,14 @@ class _MjcfImport:
             self._note("dropped", "world", f"{sites} sites of the world beside the model are left out")
         return tops[0]
 
+    def _rest(self, number: int) -> Array:
+        return pose_of(self.model.body_pos[number], self.model.body_quat[number], self.scale)
+
     def _body(self, number: int, top: int) -> None:
         model, link = self.model, self.links[number]
         joints = range(model.body_jntadr[number], model.body_jntadr[number] + model.body_jntnum[number])
         floating = any(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE for j in joints)
-        rest = pose_of(model.body_pos[number], model.body_quat[number], self.scale)
+        rest = self._rest(number)
         if number == top and (floating or not joints):
             kind = BodyKind.FREE if floating else BodyKind.STATIC
             self._add_body(Body(link, kind, gravity_compensation=floating and self._compensated(number)))
@@ -206,7 +211,7 @@ class _MjcfImport:
                 if text is not None:
                     self._note("repaired", body.name, text)
                 total = inertia.moving(total)
-            self.bodies[i] = replace(body, inertial=total)
+            self.bodies[i] = replace(body, inertial=total, virtual=i in self.virtual)
 
     def _share(self, virtual: int, whole: Inertial, share: float) -> Inertial:
         """The inertial of an extra link of a body that has this one: as the body lies at the file's zero."""
@@ -216,6 +221,17 @@ class _MjcfImport:
         text = f"stands for one of the joints of '{self.bodies[body].name}', and takes {share:g} of its mass"
         self._note("repaired", self.bodies[virtual].name, f"{text}: {share * whole.mass:.3g} kg")
         return inertia.moved(inertia.scaled(whole, share), pose)
+
+    def _of_parts(self, geometry: GeomReader) -> Iterator[Geom]:
+        """The geoms; those that collide, of bodies that are lumped of several, with the centre of mass of their own."""
+        for geom, number in zip(geometry.geoms, geometry.numbers, strict=True):
+            part = int(self.model.geom_bodyid[number])
+            if geom.collides and sum(body == geom.body for body, _ in self.frames.values()) > 1:
+                inner = pose_of(self.model.body_ipos[part], self.model.body_iquat[part], self.scale)
+                com = P.compose(self.frames[part][1], inner)[:3]
+                yield replace(geom, part_com=tidy(com))
+            else:
+                yield geom
 
     def _sites(self) -> None:
         model, taken = self.model, {*self.links, *(body.name for body in self.bodies)}
@@ -254,7 +270,9 @@ class _MjcfImport:
         home = [k for k in range(model.nkey) if model.key(k).name == "home"]
         start = model.key_qpos[home[0]] if home else model.qpos0
         initial = float(start[model.jnt_qposadr[j]]) * unit
-        softness = 0.0 if mixed(model.jnt_solref[j]) else float(model.jnt_solref[j, 0])
+        limited, rubs = bool(model.jnt_limited[j]), model.dof_frictionloss[dof] > 0
+        limit = constraint_compliance(model.jnt_solref[j], model.jnt_solimp[j], model.jnt_margin[j], unit)
+        dry = constraint_compliance(model.dof_solref[dof], model.dof_solimp[dof], unit=unit)
         if not lower <= initial <= upper:
             self._note("repaired", name, f"starts at {initial:g}, outside of [{lower:g}, {upper:g}]; now at the limit")
         return Joint(
@@ -270,19 +288,23 @@ class _MjcfImport:
             friction=float(model.dof_frictionloss[dof]),
             armature=float(model.dof_armature[dof]),
             initial=min(max(initial, lower), upper),
-            limit_softness=softness if softness > 0 and abs(softness - 0.02) > 1e-9 else 0.0,
+            limit_softness=softness(model.jnt_solref[j]),
             stiffness=float(model.jnt_stiffness[j]),
             spring_rest=float(model.qpos_spring[model.jnt_qposadr[j]]) * unit if model.jnt_stiffness[j] else 0.0,
+            limit_compliance=limit if limited else None,
+            friction_compliance=dry if rubs else None,
         )
 
     def _couplings(self) -> Couplings:
         """Tendons and constraints; joints that follow others are told so."""
         floating = self.bodies[0].kind is BodyKind.FREE
-        couplings = Couplings(self.model, self.scale, self.number, self._unit, self.frames, floating)
+        origin = _IDENTITY if floating or self.model.body_jntnum[self.top] else P.inverse(self._rest(self.top))
+        couplings = Couplings(self.model, self.scale, self.number, self._unit, self.frames, floating, origin)
         try:
-            for follower, mimic in couplings.following():
+            for follower, mimic, tie in couplings.following():
                 start = mimic.position(self.joints[mimic.joint].initial)
-                self.joints[follower] = replace(self.joints[follower], mimic=mimic, initial=start)
+                joint = self.joints[follower]
+                self.joints[follower] = replace(joint, mimic=mimic, initial=start, mimic_compliance=tie)
         except AssetError as error:
             raise AssetError(f"{self.path}: {error}") from None
         for e in range(self.model.neq):

@@ -13,29 +13,25 @@ import numpy as np
 
 from anysim.assets.model import Fate, ImportNote
 from anysim.errors import listing
+from anysim_mujoco.mjcf.compliance import mixed
 from anysim_mujoco.mjcf.coverage import BOOKKEEPING, FIELDS, fate, whole
 
 PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
     ("geom", "solref"): lambda geom: _solref(geom.solref),
-    ("geom", "solimp"): lambda geom: "its width, midpoint and power are left out" if _bent(geom.solimp) else "",
-    ("geom", "condim"): lambda geom: _CONDIM.get(int(geom.condim), ""),
     ("geom", "contype"): lambda geom: _masked(geom),
     ("geom", "conaffinity"): lambda geom: "",  # with contype
     ("joint", "damping"): lambda joint: _polynomial(joint, "damping"),
     ("joint", "stiffness"): lambda joint: _polynomial(joint, "stiffness"),
-    ("joint", "solref_limit"): lambda joint: _solref(joint.solref_limit) if _limited(joint) else "",
-    ("joint", "solimp_limit"): lambda joint: _whole(joint, "solimp_limit") if _limited(joint) else "",
-    ("joint", "margin"): lambda joint: _whole(joint, "margin") if _limited(joint) else "",
-    ("joint", "solref_friction"): lambda joint: _whole(joint, "solref_friction") if _rubs(joint) else "",
-    ("joint", "solimp_friction"): lambda joint: _whole(joint, "solimp_friction") if _rubs(joint) else "",
+    ("joint", "solref_limit"): lambda joint: _solref(joint.solref_limit),
+    ("joint", "solref_friction"): lambda joint: _solref(joint.solref_friction),
     ("joint", "actfrcrange"): lambda joint: _lopsided(joint.actfrcrange),
     ("actuator", "forcerange"): lambda drive: _lopsided(drive.forcerange),
     ("actuator", "ctrlrange"): lambda drive: _lopsided(drive.ctrlrange) if _motor(drive) else "",
     ("tendon", "damping"): lambda tendon: _polynomial(tendon, "damping"),
     ("tendon", "stiffness"): lambda tendon: _polynomial(tendon, "stiffness"),
     ("tendon", "solref_limit"): lambda tendon: _solref(tendon.solref_limit),
-    ("equality", "data"): lambda tie: _torque(tie),
-    ("equality", "solref"): lambda tie: _held(tie),
+    ("tendon", "solref_friction"): lambda tendon: _solref(tendon.solref_friction),
+    ("equality", "solref"): lambda tie: _solref(tie.solref),
     ("equality", "active"): lambda tie: "" if tie.active else "is inactive, and left out",
     ("key", "qpos"): lambda key: "" if key.name == "home" else "are not kept: only the keyframe 'home' is",
 }
@@ -44,11 +40,6 @@ PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
 WHOLE = "texture skin camera light pair sensor numeric text tuple plugin".split()
 """The elements that are left out with a note each; tendons and flexes have words of their own."""
 
-_CONDIM = {
-    1: "contacts have friction where either surface has: a frictionless one is `friction: 0`",
-    6: "rolling friction is not simulated on every engine",
-}
-_SPATIAL = ", which is left out: they are paths through space, and tendons here are sums of joint positions"
 OF_SCENE = tuple("option texture skin material camera light sensor pair key numeric text tuple plugin".split())
 WORLD_OPTIONS = ("timestep", "gravity", "cone", "impratio")
 """What of a file's options the `physics` of a world of it has."""
@@ -183,16 +174,10 @@ def _named(elements: list[Any], effect: str) -> str:
 
 
 def of_tendons(model: Any) -> Iterator[ImportNote]:
-    """Notes of the tendons of a compiled file: what spatial ones would do, which is left out; most only measure."""
-    told: dict[str, list[Any]] = {}
-    for t in range(model.ntendon):
-        if is_fixed(model, t) and tendon_effects(model, t):
-            continue
-        for effect in tendon_effects(model, t) or ["do nothing in the file either: they only measure"]:
-            told.setdefault(effect, []).append(model.tendon(t))
-    for effect, ones in told.items():
-        idle = "nothing" in effect
-        yield ImportNote("info" if idle else "dropped", "tendons", _named(ones, effect + _SPATIAL * (not idle)))
+    """Notes of the tendons of a compiled file that are left out: those that only measure."""
+    idle = [model.tendon(t) for t in range(model.ntendon) if not tendon_effects(model, t)]
+    if idle:
+        yield ImportNote("info", "tendons", _named(idle, "do nothing in the file either: they only measure"))
 
 
 def is_fixed(model: Any, t: int) -> bool:
@@ -220,48 +205,8 @@ def tendon_effects(model: Any, t: int) -> list[str]:
 # ------------------------------------------------------------------ fields that are read in part
 
 
-def mixed(solref: Any) -> bool:
-    """Whether a `solref` (2,) mixes a time constant with a damping, or the reverse: MuJoCo takes its default there."""
-    return bool((solref[0] > 0) != (solref[1] > 0))
-
-
 def _solref(value: Any) -> str:
-    if mixed(value):
-        return f"{value[0]:g} {value[1]:g} mixes two forms: the default holds, as in MuJoCo"
-    if value[0] <= 0:
-        return f"{value[0]:g} {value[1]:g} is a stiffness and a damping, and left out"
-    return "" if value[1] == 1.0 else f"the damping ratio of {value[1]:g} is left out"
-
-
-def _torque(tie: Any) -> str:
-    scale = float(tie.data[10])
-    welds = tie.type == mujoco.mjtEq.mjEQ_WELD
-    return f"the torquescale of {scale:g} is left out" if welds and scale != 1.0 else ""
-
-
-def _held(tie: Any) -> str:
-    kind, told = tie.type, value_of(tie, "solref")
-    if kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_TENDON):
-        return _solref(tie.solref)
-    return _left_out("equality", "solref", told)
-
-
-def _whole(joint: Any, field: str) -> str:
-    return _left_out("joint", field, value_of(joint, field))
-
-
-def _limited(joint: Any) -> bool:
-    if joint.limited == mujoco.mjtLimited.mjLIMITED_AUTO:
-        return bool(joint.range[0] < joint.range[1])
-    return joint.limited == mujoco.mjtLimited.mjLIMITED_TRUE
-
-
-def _rubs(joint: Any) -> bool:
-    return any(_numbers(joint.frictionloss))
-
-
-def _bent(solimp: Any) -> bool:
-    return tuple(solimp[2:]) != (0.001, 0.5, 2.0)
+    return f"{value[0]:g} {value[1]:g} mixes two forms: the default holds, as in MuJoCo" if mixed(value) else ""
 
 
 def _masked(geom: Any) -> str:

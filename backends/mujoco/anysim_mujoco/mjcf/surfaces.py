@@ -7,17 +7,21 @@ decides the pair, and the bouncier of two outweighs the other, which is the pair
 from dataclasses import dataclass
 from functools import lru_cache
 from math import atan2, exp, log, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.model.world import Surface
+from anysim.model.world import Compliance, Surface
 
 STIFF_IMPEDANCE = (0.99, 0.999, 0.001, 0.5, 2.0)
 """Impedance of joint limits and mimic couplings: they give way by next to nothing."""
 
 DRY_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """Impedance of dry friction, MuJoCo's largest: under 95 % of 5 N m a joint of 0.1 kg m^2 creeps by 1e-5 rad/s."""
+
+NATIVE_REFERENCE, NATIVE_IMPEDANCE = 0.02, (0.9, 0.95, 0.001, 0.5, 2.0)
+"""MuJoCo's own time constant [s] and impedance of all constraints."""
 
 BOUNCE_FREQUENCY = 0.3
 """Natural frequency of a bouncy contact [rad per time step]. A bounce takes ten steps and sinks 6 mm per m/s at 2 ms; a
@@ -34,25 +38,29 @@ class ContactParameters:
     solref: tuple[float, float]
     solimp: tuple[float, float, float, float, float]
     solmix: float
+    margin: float
+    """[m] from which on forces act; things come to rest off each other by it."""
     gap: float
-    """[m] from which on contacts are found; forces act from touch on. A `margin` would lift things by it."""
+    """[m] off the margin from which on contacts are found."""
 
 
 def contact_parameters(surface: Surface, dt: float) -> ContactParameters:
     """MuJoCo's contact parameters of a surface, for a time step `dt` [s]."""
+    own = surface.compliance or Compliance()
     low, high = surface.impedance
-    solref, solmix = (surface.softness or 0.02, 1.0), 1.0
+    solref, solmix = own.reference or (surface.softness or 0.02, 1.0), own.weight
     if surface.restitution > 0:
         ratio = damping_ratio(surface.restitution)
         solref, solmix = (dt / (BOUNCE_FREQUENCY * ratio), ratio), 10.0 ** (20 + 100 * surface.restitution)
     return ContactParameters(
         friction=(surface.friction, surface.torsional_friction, surface.rolling_friction),
-        condim=4 if surface.torsional else 3,
+        condim=own.dimensions or (4 if surface.torsional else 3),
         priority=surface.priority,
         solref=solref,
-        solimp=(low, high, 0.001, 0.5, 2.0),
+        solimp=own.impedance or (low, high, 0.001, 0.5, 2.0),
         solmix=solmix,
-        gap=surface.contact_offset or 0.0,
+        margin=own.margin,
+        gap=own.gap if surface.contact_offset is None else surface.contact_offset,
     )
 
 
@@ -61,9 +69,28 @@ def restitution_of(solmix: Array) -> Array:
     return np.where(solmix > 1e19, (np.log10(np.maximum(solmix, 1.0)) - 20.0) / 100.0, 0.0)
 
 
-def constraint_solref(softness: float, dt: float) -> tuple[float, float]:
-    """Reference of a joint limit or coupling: as stiff as the time step allows unless a time constant [s] is given."""
-    return (max(softness, 2 * dt) if softness > 0 else max(0.004, 2 * dt), 1.0)
+class ConstraintFields(NamedTuple):
+    """MuJoCo's fields of a limit, a tie or dry friction."""
+
+    solref: tuple[float, float]
+    solimp: tuple[float, float, float, float, float]
+    margin: float
+
+
+class Stiffness(NamedTuple):
+    """How hard constraints are, for a time step `dt` [s]; `native`: as MuJoCo has those of which nothing was said."""
+
+    dt: float
+    native: bool
+
+    def fields(
+        self, given: Compliance | None, softness: float = 0.0, impedance: tuple[float, ...] = STIFF_IMPEDANCE
+    ) -> ConstraintFields:
+        """Of a constraint: as its source says, else by its time constant [s], else as stiff as the step allows."""
+        own = given or Compliance()
+        constant = softness or (NATIVE_REFERENCE if self.native else 0.004)
+        a, b, c, d, e = own.impedance or (NATIVE_IMPEDANCE if self.native else impedance)
+        return ConstraintFields(own.reference or (max(constant, 2 * self.dt), 1.0), (a, b, c, d, e), own.margin)
 
 
 def rebound(ratio: float) -> float:

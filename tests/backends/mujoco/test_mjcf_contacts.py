@@ -1,0 +1,74 @@
+"""Whole MJCF files in contact against MuJoCo on the same files, with what docs/model_contacts.json is made of."""
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from anysim.model.world import World
+
+ROOT = Path(__file__).parents[3]
+FAR = 1e-4
+
+
+@pytest.fixture(scope="module")
+def contacts() -> ModuleType:
+    """`benchmarks/model_contacts.py`, which is no package."""
+    spec = importlib.util.spec_from_file_location("benchmark_of_contacts", ROOT / "benchmarks/model_contacts.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def folder() -> Path:
+    found = importlib.util.find_spec("gymnasium")
+    if found is None or found.origin is None:
+        pytest.skip("gymnasium, whose files these are, is not installed")
+    return Path(found.origin).parent / "envs/mujoco/assets"
+
+
+@pytest.mark.parametrize(
+    ("file", "touching"), [("ant.xml", 5), ("humanoid.xml", 100), ("walker2d_v5.xml", 50), ("swimmer.xml", 0)]
+)
+def test_they_touch_and_move_as_in_mujoco(contacts: ModuleType, folder: Path, file: str, touching: int) -> None:
+    """100 steps with contacts, limits and fluids, solved by the file's own integrator and solver."""
+    row = contacts.compared(folder / file, "gymnasium", ("mujoco",))
+    assert (row.refused, row.others) == ({}, {})
+    assert row.touching >= touching
+    assert row.mujoco is not None
+    assert row.mujoco < FAR
+
+
+@pytest.mark.parametrize("without", ["compliance", "parts"])
+def test_what_the_file_sets_matters(
+    contacts: ModuleType, folder: Path, monkeypatch: pytest.MonkeyPatch, without: str
+) -> None:
+    """The comparison would find a model without it."""
+    whole = contacts.scene
+
+    def less(*given: Any) -> tuple[World, list[int]]:
+        world, roots = whole(*given)
+        geoms = tuple(
+            replace(g, part_com=None) if without == "parts" else replace(g, surface=replace(g.surface, compliance=None))
+            for g in world.geoms
+        )
+        return replace(world, geoms=geoms), roots
+
+    monkeypatch.setattr(contacts, "scene", less)
+    row = contacts.compared(folder / "humanoid.xml", "gymnasium", ("mujoco",))
+    assert row.mujoco is not None
+    assert row.mujoco > FAR
+
+
+def test_a_file_in_which_nothing_moves_has_a_reason(contacts: ModuleType, tmp_path: Path) -> None:
+    path = tmp_path / "still.xml"
+    path.write_text('<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>')
+    assert contacts.compared(path, "own", ("mujoco",)).refused == {"": "nothing in it moves"}
