@@ -4,8 +4,8 @@
 
 The world is docs/worlds/fifteen_families.yaml. Two envs play side by side: the arm gets another random command twice a
 second, and things get random pushes. What is recorded goes to FOLDER, with a film of each episode, and four stills of
-the first. In the middle of the first episodes the envs are saved; in the end they go on from there in envs that were
-newly made, and what everything is like is compared after each step, to the bit. Printed are how the episodes ended,
+the first. In the middle of the first episodes the envs are saved; in the end they go on from there for ten seconds in
+envs that were newly made, and what everything is like is compared before each step, to the bit. Printed are how the episodes ended,
 how fast and how far off matter was at most, and the processor time of a physics step of one env.
 """
 
@@ -30,6 +30,8 @@ NUM_ENVS = 2
 HELD = 25
 """Control steps for which a command is held."""
 STILLS = 4
+AGAIN = 500
+"""Control steps at most that are done once more, from what was saved in the middle."""
 
 
 def digest(env: anysim.TaskEnv) -> bytes:
@@ -48,7 +50,7 @@ class Play:
 
     Attributes:
         middle: what was saved in the middle of the first episodes.
-        actions, digests: of the second half of them, before each step.
+        actions, digests: of the steps after it.
         fastest: [m/s] of any point of matter, by family.
         farthest: [m] of any point from the middle of the world, by family.
     """
@@ -86,7 +88,7 @@ class Play:
         """Of the first episodes: save the middle, follow what comes after it, and take stills."""
         if self._done == self._steps // 2:
             self.middle = self._env.snapshot()
-        if self.middle is not None:
+        if self.middle is not None and len(self.actions) < AGAIN:
             self.actions.append(self._action.copy())
             self.digests.append(digest(self._env))
         every = max(1, self._steps // STILLS)
@@ -129,9 +131,9 @@ def made(engine: str, steps: int) -> anysim.TaskEnv:
 
 
 def play(engine: str, steps: int, episodes: int, folder: Path, *, stills: bool = False) -> dict[str, Any]:
-    """Episodes of so many control steps, of which the second half of the first ones is done once more.
+    """Episodes of so many control steps, of which the first ones are gone on with once more from their middle.
 
-    Returns how they ended, whether the second half was the same to the bit, and what matter did.
+    Returns how they ended, whether they went on as before to the bit, and what matter did.
     """
     with made(engine, steps) as env:
         source = Play(env, steps, folder if stills else None)
