@@ -22,8 +22,9 @@ from anysim_soft.subworld import FlexSource
 
 CHECKED = "3.17"
 """The version of MuJoCo whose constants these replace."""
-MANY = 200
-"""Points of a sheet from which on conjugate gradients cost less than Newton's method: less than half of it at 400."""
+MANY = 150
+"""Points of sheets and skins from which on conjugate gradients cost less than Newton's method: 0.6 of it for a balloon
+of 162, less than half for a sheet of 400."""
 GRADIENTS = {**OPTIONS, "solver": "CG", "tolerance": 1e-13}
 """What is lost of the momentum to this tolerance is a hundred-millionth of what is traded."""
 BENT = 4 / 3
