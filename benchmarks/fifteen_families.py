@@ -5,8 +5,8 @@
 The world is docs/worlds/fifteen_families.yaml. Two envs play side by side: the arm gets another random command twice a
 second, and things get random pushes. What is recorded goes to FOLDER, with a film of each episode, and four stills of
 the first. In the middle of the first episodes the envs are saved; in the end they go on from there for ten seconds in
-envs that were newly made, and what everything is like is compared before each step, to the bit. Printed are how the episodes ended,
-how fast and how far off matter was at most, and the processor time of a physics step of one env.
+envs that were newly made, and what everything is like is compared before each step, to the bit. Printed are how the
+episodes ended, how fast and how far off matter was at most, and the processor time of a physics step of one env.
 """
 
 import argparse
@@ -64,7 +64,9 @@ class Play:
         self._done, self._round = 0, 0
         self._action = np.zeros((env.num_envs, env.action_dim))
         names = env.spec.world.families or {}
-        self._matter = [name for name in names if isinstance(family := env.families.family(name), CoSolver) and family.drawn]
+        self._matter = [
+            name for name in names if isinstance(family := env.families.family(name), CoSolver) and family.drawn
+        ]
         self.middle: Any = None
         self.actions, self.digests = list[Array](), list[bytes]()
         self.fastest, self.farthest = dict.fromkeys(self._matter, 0.0), dict.fromkeys(self._matter, 0.0)

@@ -28,5 +28,5 @@ def test_a_family_is_measured_beside_the_world_without_it(kind, points, monkeypa
 def test_a_name_that_is_no_family_is_told():
     from anysim_particles.cli import families
 
-    with pytest.raises(anysim.errors.AnysimError, match="--kinds.*watr.*fluid"):
+    with pytest.raises(anysim.errors.AnysimError, match=r"--kinds.*watr.*fluid"):
         families(kinds="watr", num_envs="1")

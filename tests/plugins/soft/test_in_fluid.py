@@ -1,4 +1,4 @@
-"""A balloon in water, and a body that touches matter and something that the engine holds: what they trade, to the bit."""
+"""A balloon in water, and a body that touches matter and something that the engine holds: what they trade."""
 
 from typing import Any
 
@@ -84,7 +84,7 @@ def test_it_goes_on_from_a_snapshot_in_the_middle_of_a_splash() -> None:
 
 @EACH
 def test_a_body_on_a_block_and_on_a_sponge_gets_all_that_it_gets(engine: str) -> None:
-    """A board of which the engine holds one end and soft matter the other: forces of both and weight give its motion."""
+    """A board that the engine holds at one end and soft matter at the other: all forces together give its motion."""
     require_engine(engine)
     world = {
         "objects": {
