@@ -1,4 +1,4 @@
-"""Costs of matter: a tank with a box that floats or lies on top, with and without what is in it."""
+"""Costs of families: a world with one, and without it; particles are in a tank with a box on top."""
 
 import time
 from collections.abc import Callable
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import anysim
+from anysim_particles.bench_cases import case_of
 
 SETTLE = 15
 """Control steps until it is measured."""
@@ -19,7 +20,8 @@ class FamilyCost(NamedTuple):
     """Physics steps of 4 ms.
 
     Attributes:
-        engine, family, particles, num_envs: what was measured; particles are the points of any matter.
+        engine, family, particles, num_envs: what was measured; particles are the points of any matter, or the bodies of
+            what an engine holds.
         per_second: steps of one env per second of processor time.
         wall_per_second: steps of all envs together per second.
         alone: steps of one env per second of processor time without the matter.
@@ -70,20 +72,26 @@ def world_of(kind: str, particles: int) -> dict[str, Any]:
 
 
 def cost(kind: str, particles: int, num_envs: int, engine: str, steps: int) -> FamilyCost:
-    """What a physics step costs with matter at rest, and without it."""
-    return cost_in(world_of(kind, particles), kind, num_envs, engine, steps)
+    """What a physics step costs with matter at rest, and without it; `particles` is of those that are made of them."""
+    world = world_of(kind, particles) if kind in EDGES else case_of(kind)
+    return cost_in(world, kind, num_envs, engine, steps)
 
 
 def cost_in(world: dict[str, Any], called: str, num_envs: int, engine: str, steps: int) -> FamilyCost:
-    """The same in a world whose family `matter` is called so in the table."""
+    """The same in a world whose family or object `matter` is called so in the table."""
     with _made(world, engine, num_envs) as env:
         env.reset(seed=0)
         action = np.zeros((num_envs, 0))
         _run(lambda: env.step(action), SETTLE)
         cpu, wall = _run(lambda: env.step(action), steps)
-        assert env.families is not None
-        there = env.families.state("matter").points.shape[1]
-    with _made({**world, "families": {}}, engine, num_envs) as env:
+        if world["families"]:
+            assert env.families is not None
+            there = env.families.state("matter").points.shape[1]
+        else:
+            entities = [entity for entity in env.engine.world.entities if entity.category == "matter"]
+            there = sum(entity.body_stop - entity.body_start for entity in entities)
+    bare = {key: {n: one for n, one in world[key].items() if n != "matter"} for key in ("objects", "layout")}
+    with _made({**world, **bare, "families": {}}, engine, num_envs) as env:
         env.reset(seed=0)
         _run(lambda: env.engine.step(SUBSTEPS), 4)
         alone, _ = _run(lambda: env.engine.step(SUBSTEPS), 20)

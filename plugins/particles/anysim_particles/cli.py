@@ -15,25 +15,29 @@ def families(
     engine: Annotated[str, typer.Option("--engine", "-e", help="Engines, separated by commas.")] = "mujoco",
     particles: Annotated[str, typer.Option(help="Particles of each env, separated by commas.")] = "1000,5000",
     num_envs: Annotated[str, typer.Option("--num-envs", "-n", help="Numbers of envs, separated by commas.")] = "1,4",
-    kinds: Annotated[str, typer.Option(help="Families, separated by commas.")] = "fluid,sand,rice",
+    kinds: Annotated[str, typer.Option(help="Families, separated by commas; all of them if not given.")] = "",
     steps: Annotated[int, typer.Option(min=1, help="Control steps of five physics steps that are measured.")] = 10,
     json: AsJson = False,
 ) -> None:
-    """Physics steps of one env per second of processor time, with matter at rest in a tank beside a box that floats.
+    """Physics steps of one env per second of processor time, of a world with one family.
 
-    The rest of the step is what the same world costs without the matter, stepped five at a time, and one at a time as
+    Particles are at rest in a tank, with a box on top; the others have a size of their own, and a ball that they meet.
+    The rest of the step is what the same world costs without the family, stepped five at a time, and one at a time as
     it is beside a co-solver. Wall time is that of all envs together, shared by threads.
 
     Examples:
       anysim bench families --engine mujoco,pybullet,sapien --particles 1000
     """
     from anysim_particles.bench import EDGES, cost
+    from anysim_particles.bench_cases import FAMILIES, OBJECTS
 
+    known = [*OBJECTS, *EDGES, *FAMILIES]
+    sizes = numbers(particles, "--particles", int, 1)
     found = [
         cost(kind, size, envs, name, steps)
         for name in parts(engine, "--engine")
-        for kind in parts(kinds, "--kinds", EDGES)
-        for size in numbers(particles, "--particles", int, 1)
+        for kind in parts(kinds or ",".join(known), "--kinds", known)
+        for size in (sizes if kind in EDGES else sizes[:1])
         for envs in numbers(num_envs, "--num-envs", int, 1)
     ]
     print_costs(found, json=json)

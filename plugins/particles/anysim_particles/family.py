@@ -2,7 +2,7 @@
 
 import os
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import ClassVar
 
@@ -18,6 +18,7 @@ from anysim.math import pose as P
 from anysim.model.appearance import rgb
 from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
+from anysim_particles import skins
 from anysim_particles.spec import MOST, MatterSpec
 from anysim_schemas.base import Spec
 from anysim_sensors.scene import SceneGeometry
@@ -31,6 +32,8 @@ class Particles(CoSolver):
     color: ClassVar[tuple[float, float, float]]
     looks: ClassVar[float] = 1.0
     """How much larger than its matter a particle is drawn."""
+    meets_skins: ClassVar[bool] = False
+    """Whether it meets the skins of other matter."""
 
     # ------------------------------------------------------------------ what kinds differ in
 
@@ -136,17 +139,25 @@ class Particles(CoSolver):
     def solve(self, env_ids: Array, bodies: MetBodies, duration: float) -> Array:
         from anysim_particles.kernels.contacts import Proxies
 
-        k, n = len(self.met), len(env_ids)
+        n = len(env_ids)
+        others = skins.offered(self.engine) if self.meets_skins else ()
+        tables = [skins.table([other.skin(env) for other in others]) for env in env_ids.tolist()]
+        met, size = len(self.met), len(self.met) + (len(tables[0].points) if tables else 0)
         posed = self.scene.posed(bodies.body_pose, bodies.there)
-        impulse = np.zeros((n, k + 1, 6))
+        impulse = np.zeros((n, size + 1, 6))
         free = np.isfinite(bodies.mass) & (bodies.mass > 0)
-        light = np.zeros((n, k + 1))
-        light[:, :k][free] = 1.0 / bodies.mass[free]
-        turns = np.zeros((n, k + 1, 3, 3))
+        light = np.zeros((n, size + 1))
+        light[:, :met][free] = 1.0 / bodies.mass[free]
+        turns = np.zeros((n, size + 1, 3, 3))
         if free.any():
-            turns[:, :k][free] = np.linalg.inv(bodies.inertia[free])
-        com, twist = np.zeros((n, k + 1, 3)), np.zeros((n, k + 1, 6))
-        com[:, :k], twist[:, :k] = bodies.com, bodies.twist
+            turns[:, :met][free] = np.linalg.inv(bodies.inertia[free])
+        com, twist = np.zeros((n, size + 1, 3)), np.zeros((n, size + 1, 6))
+        com[:, :met], twist[:, :met] = bodies.com, bodies.twist
+        for row, one_table in enumerate(tables):
+            com[row, met:size], twist[row, met:size, :3] = one_table.points, one_table.velocities
+            light[row, met:size] = 1.0 / one_table.mass
+        slot = np.where(self._slot == met, np.int32(size), self._slot)
+        falls = np.concatenate([self._falls[:met], np.zeros(size + 1 - met, dtype=bool)])
         # rows of their own: kernels are compiled for each layout
         friction = np.ascontiguousarray(bodies.friction[:, self.scene.geoms.number])
 
@@ -159,16 +170,19 @@ class Particles(CoSolver):
                 com[row].copy(),
                 twist[row],
                 twist[row].copy(),
-                self._falls,
+                falls,
                 light[row],
                 turns[row],
                 impulse[row],
-                self._slot,
+                slot,
                 posed.frame[row],
                 posed.low[row],
                 posed.high[row],
                 posed.there[row],
                 friction[row],
+                tables[row].face + np.int32(met),
+                tables[row].begin,
+                tables[row].thick,
             )
             self.step_env(env, proxies, duration)
 
@@ -180,7 +194,21 @@ class Particles(CoSolver):
         else:
             for row in range(n):
                 one(row)
-        return np.ascontiguousarray(impulse[:, :k])
+        if others:
+            self._splash(env_ids, others, tables, impulse[:, met:size, :3])
+        return np.ascontiguousarray(impulse[:, :met])
+
+    def _splash(
+        self, env_ids: Array, others: Sequence[skins.Skinned], tables: Sequence[skins.SkinTable], impulse: Array
+    ) -> None:
+        """Tell families of other matter what their points (n, V, 3) [N s] got; it was not received from them."""
+        for row, env in enumerate(env_ids.tolist()):
+            got, points = impulse[row], tables[row].points
+            self.received[env] -= np.concatenate([got.sum(axis=0), P.cross(points, got).sum(axis=0)])
+            begun = 0
+            for other, count in zip(others, tables[row].counts, strict=True):
+                other.splash(env, got[begun : begun + count])
+                begun += count
 
     def momentum(self, env_ids: Array) -> Array:
         mass, found = self.particle_mass(env_ids), np.zeros((len(env_ids), 6))

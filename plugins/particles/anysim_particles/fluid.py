@@ -16,6 +16,7 @@ class Fluid(Particles):
     label = "liquid"
     color = (0.15, 0.42, 0.75)
     looks: ClassVar[float] = 1.25
+    meets_skins: ClassVar[bool] = True
 
     def __init__(self, setting: FamilySetting) -> None:
         super().__init__(setting)

@@ -208,7 +208,7 @@ class Soft(CoSolver):
             if not np.isfinite(self.state_row[env]).all():
                 return
             sub = self._world(env)
-            sub.load(self.state_row[env])
+            sub.take(self.state_row[env])
             sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
             sub.place()
             self.before_solve(env, sub)

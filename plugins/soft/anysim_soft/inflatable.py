@@ -14,7 +14,8 @@ from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.errors import PluginError
 from anysim.families.base import FamilySetting
 from anysim.math import pose as P
-from anysim_soft.cloth import CHECKED, membrane
+from anysim_particles.skins import Skin, offer
+from anysim_soft.cloth import CHECKED, GRADIENTS, MANY, membrane
 from anysim_soft.deformable import OPTIONS, contact_of, numbers
 from anysim_soft.family import Soft
 from anysim_soft.spec import InflatableSpec, SoftSpec
@@ -34,6 +35,7 @@ class Inflatable(Soft):
     Attributes:
         pressure: (N,) [Pa] of the gas above that of the air, as it acts.
         gas: (N,) [J] its pressure times its volume, n R T.
+        wet: (N, V, 3) [N s] what liquids gave to its points, and its solver has not yet.
     """
 
     spec = InflatableSpec
@@ -48,10 +50,12 @@ class Inflatable(Soft):
                 f"of {mujoco.__version__} are not known; install mujoco=={CHECKED}.0"
             )
         assert isinstance(setting.spec, InflatableSpec)
-        self.skin = setting.spec
-        self._points, self._faces = sphere(self.skin.subdivisions)
+        self._spec = setting.spec
+        self._points, self._faces = sphere(self._spec.subdivisions)
         super().__init__(setting)
         self.pressure, self.gas = self.remember("gas_pressure"), self.remember("gas")
+        self.wet = self.remember("wet", len(self._points), 3)
+        offer(setting.engine, self)
 
     @classmethod
     def count(cls, spec: SoftSpec) -> int:
@@ -60,10 +64,10 @@ class Inflatable(Soft):
 
     @property
     def radius(self) -> float:
-        return self.skin.skin
+        return self._spec.skin
 
     def source(self, values: Mapping[str, float], pose: Array) -> FlexSource:
-        spec, points, faces = self.skin, self.skin.radius * self._points, self._faces
+        spec, points, faces = self._spec, self._spec.radius * self._points, self._faces
         young, poisson, thickness = values["young"], values["poisson"], values["thickness"]
         corner = points[faces]
         area = P.norm(P.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])) / 2
@@ -85,10 +89,12 @@ class Inflatable(Soft):
             f"{contact_of(values['friction'], self._step)}</flexcomp>"
         )
 
+        options = GRADIENTS if len(points) >= MANY else OPTIONS
+
         def adjust(model: mujoco.MjModel) -> None:
             model.flex_stiffness.reshape(-1, 21)[:, :6] = membrane(model, young, poisson, thickness)
 
-        return FlexSource(xml, np.zeros(len(points), dtype=bool), mass, OPTIONS, {}, adjust)
+        return FlexSource(xml, np.zeros(len(points), dtype=bool), mass, options, {}, adjust)
 
     # ------------------------------------------------------------------ its life
 
@@ -98,7 +104,7 @@ class Inflatable(Soft):
             young, poisson, thickness, pressure = (
                 self.parameter(key, env) for key in ("young", "poisson", "thickness", "pressure")
             )
-            strain = pressure * self.skin.radius * (1.0 - poisson) / (2.0 * young * thickness)
+            strain = pressure * self._spec.radius * (1.0 - poisson) / (2.0 * young * thickness)
             if strain > MOST_STRAIN:
                 raise PluginError(
                     f"world.families.{self.setting.name}: {pressure:g} Pa would stretch the skin by {100 * strain:.3g} "
@@ -113,7 +119,7 @@ class Inflatable(Soft):
             self.gas[env] = (AIR + pressure) * volume(self.x[env], self._faces)
 
     def inside(self, env: int) -> Callable[[SubWorld], Array]:
-        """What gives the forces (V, 3) [N] of the gas on the skin, once a step of the solver."""
+        """What gives the forces (V, 3) [N] of gas and liquids on the skin, once a step of the solver."""
 
         def press(sub: SubWorld) -> Array:
             x, v, h = sub.node_places(), sub.node_speeds(), sub.model.opt.timestep
@@ -125,9 +131,28 @@ class Inflatable(Soft):
             due = self.gas[env] / now - absolute - absolute / now * swells * h
             self.pressure[env] += share * due
             acts = self.pressure[env] - DAMPED * h / yields * swells
-            return acts * slope
+            return acts * slope + self.wet[env] / (h * self.soft.substeps)
 
         return press
+
+    def after_solve(self, env: int, sub: SubWorld) -> None:
+        self.wet[env] = 0.0
+
+    # ------------------------------------------------------------------ liquids
+
+    def skin(self, env: int) -> Skin:
+        """What liquids meet of it in an env."""
+        return Skin(self.x[env], self.v[env], self._world(env).mass, self._faces, self._spec.skin)
+
+    def splash(self, env: int, impulse: Array) -> None:
+        """Its points get impulses (V, 3) [N s] from a liquid."""
+        self.wet[env] += impulse
+        self.received[env] += about_origin(impulse, self.x[env])
+
+    def momentum(self, env_ids: Array) -> Array:
+        """Of the matter, and of what its points will get."""
+        wet = [about_origin(self.wet[env], self.x[env]) for env in env_ids.tolist()]
+        return super().momentum(env_ids) + np.array(wet).reshape(-1, 6)
 
     # ------------------------------------------------------------------ what it means
 
@@ -136,7 +161,7 @@ class Inflatable(Soft):
         return volume(self.x[env], self._faces)
 
     def mass(self, env: int) -> float:
-        return self.parameter("density", env) * self.parameter("thickness", env) * 4.0 * np.pi * self.skin.radius**2
+        return self.parameter("density", env) * self.parameter("thickness", env) * 4.0 * np.pi * self._spec.radius**2
 
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         more = {"pressure": float(self.pressure[env]), "volume": self.volume(env), "gas": float(self.gas[env])}
@@ -144,6 +169,11 @@ class Inflatable(Soft):
 
     def recorded(self, env_ids: Array) -> Mapping[str, Array]:
         return {**super().recorded(env_ids), "pressure": self.pressure[env_ids]}
+
+
+def about_origin(impulse: Array, at: Array) -> Array:
+    """(6,) the sum of impulses (V, 3) [N s] at points (V, 3) [m], about the world's origin."""
+    return np.concatenate([impulse.sum(axis=0), P.cross(at, impulse).sum(axis=0)])
 
 
 def sphere(subdivisions: int) -> tuple[Array, Array]:

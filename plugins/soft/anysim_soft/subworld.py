@@ -157,8 +157,8 @@ class SubWorld:
         self._pose = model.jnt_qposadr[free].reshape(k, 1) + np.arange(7)
         self._twist = model.jnt_dofadr[free].reshape(k, 1) + np.arange(6)
         self._mocap = model.body_mocapid[[model.body(f"still {i}").id for i in range(s)]]
+        self._proxies = np.array([model.body(f"met {i}").id for i in range(k)], dtype=np.intp)
         self._geoms = np.array([model.geom(f"{i}").id for i in range(len(scenery.geoms))], dtype=np.intp)
-        self._com = bodies.com
         connects = np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_CONNECT))
         self._slots = connects[len(connects) - len(slots.places) :]
         self.faces = _faces(model)
@@ -184,9 +184,13 @@ class SubWorld:
         mujoco.mj_getState(self.model, self.data, state, STATE)
         return state
 
+    def take(self, state: Array) -> None:
+        """Take up a state; `place` works out where everything is."""
+        mujoco.mj_setState(self.model, self.data, state, STATE)
+
     def load(self, state: Array) -> None:
         """Take up a state, and work out where everything is."""
-        mujoco.mj_setState(self.model, self.data, state, STATE)
+        self.take(state)
         self.place()
 
     def place(self) -> None:
@@ -260,14 +264,13 @@ class SubWorld:
         impulse, received = np.zeros((len(self._pose), 6)), np.zeros(6)
         slower = (1.0 - np.exp(-drag * h)) / h
         for _ in range(substeps):
-            before = self.momentum()
+            before = self.momentum() if self._pinned else np.zeros(6)
             at, air = data.xpos[self._moving].copy(), -slower * self.mass[:, None] * data.qvel[self._dofs]
             data.qfrc_applied[self._dofs] = air if inside is None else air + inside(self)
             if self.source.inner is not None:
                 data.qfrc_applied[self._dofs] += self._inner()
-            turn = P.to_matrix(data.qpos[self._pose[:, 3:]][:, [1, 2, 3, 0]])
-            arm = np.einsum("kij,kj->ki", turn, self._com)
-            centre = data.qpos[self._pose[:, :3]] + arm
+            turn, centre = data.xmat[self._proxies].reshape(-1, 3, 3), data.xipos[self._proxies]
+            arm = centre - data.xpos[self._proxies]
             mujoco.mj_step1(model, data)
             if self._uneven:
                 self._even_contacts()

@@ -1,7 +1,8 @@
 """Contacts of particles with the shapes of bodies, and how bodies move while particles are solved.
 
 A body that joints do not hold has a proxy with its true mass: what particles do to it shows within the step. It starts
-from what the engine says, and nothing of it is kept. The last row of all arrays by body stands for what is fixed.
+from what the engine says, and nothing of it is kept. After the bodies come the points of skins of other matter, which
+are bodies without a size. The last row of all arrays by body stands for what is fixed.
 """
 
 import math
@@ -11,12 +12,13 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim_particles.kernels.compiling import compiled
+from anysim_particles.kernels.skins import nearest_on_skin
 from anysim_sensors.kernels.distances import convex, meshed
 from anysim_sensors.tables import CYLINDER, Geoms, Triangles
 
 
 class Proxies(NamedTuple):
-    """K bodies and, last, what is fixed; `frame`, `low`, `high` are of the G geoms.
+    """K bodies, points of skins among them, and, last, what is fixed; `frame`, `low`, `high` are of the G geoms.
 
     Attributes:
         com: (K + 1, 3) [m] where the centres of mass were when the step began.
@@ -32,6 +34,9 @@ class Proxies(NamedTuple):
         low, high: (G, 3) [m] boxes around the geoms.
         there: (G,) bool.
         friction: (G,).
+        face: (F, 3) int32 the bodies at the corners of the triangles of all skins, outward.
+        skin: (S + 1,) int32 the first face of each skin.
+        thick: (S,) [m] of matter around each skin.
     """
 
     com: Array
@@ -48,6 +53,9 @@ class Proxies(NamedTuple):
     high: Array
     there: Array
     friction: Array
+    face: Array
+    skin: Array
+    thick: Array
 
 
 class Contacts(NamedTuple):
@@ -206,6 +214,14 @@ def find_contacts(
         if close:
             chosen[some] = g
             some += 1
+    around = np.empty((b.thick.shape[0], 2, 3))
+    for s_ in range(b.thick.shape[0]):
+        for k in range(3):
+            around[s_, 0, k], around[s_, 1, k] = np.inf, -np.inf
+            for f_ in range(b.skin[s_], b.skin[s_ + 1]):
+                for corner in range(3):
+                    q = b.at[b.face[f_, corner], k]
+                    around[s_, 0, k], around[s_, 1, k] = min(around[s_, 0, k], q), max(around[s_, 1, k], q)
     count = 0
     for i in range(n):
         contacts.begin[i] = count
@@ -237,6 +253,26 @@ def find_contacts(
             contacts.normal[count, 0] = f[0] * p0 + f[1] * p1 + f[2] * p2
             contacts.normal[count, 1] = f[3] * p0 + f[4] * p1 + f[5] * p2
             contacts.normal[count, 2] = f[6] * p0 + f[7] * p1 + f[8] * p2
+            contacts.place[count, 0], contacts.place[count, 1], contacts.place[count, 2] = x, y, z
+            count += 1
+        for s_ in range(b.thick.shape[0]):
+            far = reach + b.thick[s_]
+            if (
+                around[s_, 0, 0] - far > x
+                or around[s_, 1, 0] + far < x
+                or around[s_, 0, 1] - far > y
+                or around[s_, 1, 1] + far < y
+                or around[s_, 0, 2] - far > z
+                or around[s_, 1, 2] + far < z
+            ):
+                continue
+            k, gap, p0, p1, p2 = nearest_on_skin(b.at, b.face, b.skin[s_], b.skin[s_ + 1], x, y, z, far)
+            if k < 0 or not gap - b.thick[s_] < reach:
+                continue
+            if count == contacts.slot.shape[0]:
+                contacts = _more(contacts)
+            contacts.slot[count], contacts.gap[count], contacts.friction[count] = k, gap - b.thick[s_], 0.0
+            contacts.normal[count, 0], contacts.normal[count, 1], contacts.normal[count, 2] = p0, p1, p2
             contacts.place[count, 0], contacts.place[count, 1], contacts.place[count, 2] = x, y, z
             count += 1
         for c in range(contacts.begin[i], count):

@@ -2,7 +2,8 @@
 
 After Macklin and Mueller (Position Based Fluids, 2013): a constraint of density for each particle, solved by Jacobi
 iterations whose corrections of pairs are equal and opposite. What is beyond a surface counts as a half space of fluid,
-whose share of a kernel has a formula; so particles stay half their spacing away, and surfaces feel their pressure.
+whose share of a kernel has a formula; so particles stay half their spacing away, and surfaces feel their pressure. So
+do skins of other matter, point by point.
 """
 
 import math

@@ -60,7 +60,7 @@ def grain_step(
         x_, v_: (n or more, 3) [m], [m/s], changed.
         n: how many balls there are.
         beads: of a grain.
-        geoms, triangles, b: what they meet; `b.impulse` is added to.
+        geoms, triangles, b: what they meet, bodies without skins of other matter; `b.impulse` is added to.
         received: (6,) momentum from weight and from what is fixed, added to.
         gravity: (3,) [m/s^2].
         dt: [s].
