@@ -128,7 +128,7 @@ class Garment(Soft):
         """
         if not (share or turned or tilt):
             return None
-        places = P.rotate(P.from_axis_angle(UP, turned), flat)
+        places = P.rotate(P.from_axis_angle(UP, np.array(turned)), flat)
         width = np.ptp(places[:, 0])
         beyond = np.maximum(places[:, 0] - (places[:, 0].max() - share * width), 0.0)
         bend = self.garment.spacing
@@ -136,7 +136,7 @@ class Garment(Soft):
         places[:, 0] += bend * np.sin(turn) - beyond - np.maximum(beyond - np.pi * bend, 0.0)
         places[:, 2] = bend * (1.0 - np.cos(turn)) + np.cos(turn) * places[:, 2]
         if tilt:
-            places = P.rotate(P.from_axis_angle(np.array([0.0, -1.0, 0.0]), tilt), places)
+            places = P.rotate(P.from_axis_angle(np.array([0.0, -1.0, 0.0]), np.array(tilt)), places)
             places[:, 2] -= places[:, 2].min()
         return places
 
