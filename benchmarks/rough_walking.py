@@ -1,6 +1,7 @@
 """Crossings of tiles: how far a policy of `go1_velocity_rough` gets on each kind and level, on every engine.
 
-    python benchmarks/rough_walking.py [POLICY ...] [--engines mujoco,sapien] [-n 16] [--blind] [--out FILE]
+    python benchmarks/rough_walking.py [POLICY ...] [--robot NAME] [--engines mujoco,sapien] [-n 16] [--blind]
+        [--out FILE]
 
 POLICY is what `anysim evaluate --policy` takes, or the trot and the shipped policy. The robot is that of level L0. It
 begins in any direction in the middle of a tile, and is told to walk forward at 0.5 m/s for 10 s: it got through
@@ -42,7 +43,7 @@ class Crossings(NamedTuple):
     fell: np.ndarray
 
 
-def cross(policy: str, engine: str, n: int, changes: Sequence[str] = ()) -> Crossings:
+def cross(policy: str, engine: str, n: int, changes: Sequence[str] = (), robot: str | None = None) -> Crossings:
     """Walk from the middle of every tile, n times."""
     overrides = [
         "level=L0",
@@ -52,7 +53,8 @@ def cross(policy: str, engine: str, n: int, changes: Sequence[str] = ()) -> Cros
         *changes,
     ]
     width = ENVS.get(engine, 4)
-    with anysim.make("go1_velocity_rough", engine=engine, num_envs=width, overrides=overrides, curriculum=True) as env:
+    task = {"source": "go1_velocity_rough", "robot": robot, "overrides": overrides}
+    with anysim.make(**task, engine=engine, num_envs=width, curriculum=True) as env:
         terrain = env.scene.terrain
         assert terrain is not None
         edge = 0.5 * env.spec.world.terrain.tiling.size
@@ -109,12 +111,13 @@ def lines(policy: str, engine: str, found: Crossings) -> list[str]:
     return [*rows, f"| {policy} | {engine} | all | " + " | ".join(shares) + " |"]
 
 
-def keep(file: Path, policy: str, engine: str, found: Crossings) -> None:
-    """Write what was found of a policy on an engine."""
+def keep(file: Path, robot: str | None, policy: str, engine: str, found: Crossings) -> None:
+    """Write what was found of a robot's policy on an engine."""
     known = json.loads(file.read_text("utf-8")) if file.exists() else []
-    other = [one for one in known if (one["policy"], one["engine"]) != (policy, engine)]
+    other = [one for one in known if (one.get("robot"), one["policy"], one["engine"]) != (robot, policy, engine)]
     counts = {"through": found.through.tolist(), "fell": found.fell.tolist()}
-    own = {"policy": policy, "engine": engine, "n": found.n, "kinds": list(found.kinds), **counts}
+    of = {} if robot is None else {"robot": robot}
+    own = {**of, "policy": policy, "engine": engine, "n": found.n, "kinds": list(found.kinds), **counts}
     file.write_text("[\n" + ",\n".join(json.dumps(one) for one in [*other, own]) + "\n]\n", "utf-8")
 
 
@@ -122,6 +125,7 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("policies", nargs="*", default=["expert", "shipped"])
+    parser.add_argument("--robot", help="one of the task's alternates in the place of the Go1")
     parser.add_argument("--engines", default="mujoco,pybullet,sapien")
     parser.add_argument("-n", type=int, default=16, help="episodes of each tile")
     parser.add_argument("--blind", action="store_true", help="without the height scan")
@@ -129,9 +133,9 @@ def main() -> None:
     arguments = parser.parse_args()
     for policy in arguments.policies:
         for engine in arguments.engines.split(","):
-            found = cross(policy, engine, arguments.n, [BLIND] if arguments.blind else [])
+            found = cross(policy, engine, arguments.n, [BLIND] if arguments.blind else [], arguments.robot)
             if arguments.out is not None:
-                keep(arguments.out, policy, engine, found)
+                keep(arguments.out, arguments.robot, policy, engine, found)
             levels = " | ".join(f"level {r}" for r in range(len(found.through)))
             print(f"\n| policy | engine | kind | {levels} |\n|" + "---|" * (3 + len(found.through)))
             print("\n".join(lines(policy, engine, found)), flush=True)

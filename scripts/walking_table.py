@@ -126,7 +126,7 @@ def seeds() -> str:
 
 def crossings() -> str:
     """How many tiles of each kind and level a policy gets over, on each engine."""
-    found: list[Cell] = json.loads(CROSSINGS.read_text("utf-8"))
+    found: list[Cell] = [one for one in json.loads(CROSSINGS.read_text("utf-8")) if "robot" not in one]
     found.sort(key=lambda one: one["engine"])
     levels = range(len(found[0]["through"]))
     lines = []
@@ -145,6 +145,18 @@ def crossings() -> str:
             table(["kind", "engine", "n", *(f"level {level}" for level in levels)], lines),
         ]
     )
+
+
+def trots() -> str:
+    """What share of the tiles of each level each robot's trot gets over, on each engine."""
+    found: list[Cell] = [one for one in json.loads(CROSSINGS.read_text("utf-8")) if "robot" in one]
+    found.sort(key=lambda one: (one["robot"], one["engine"]))
+    lines = []
+    for one in found:
+        total = one["n"] * len(one["kinds"])
+        shares = [_share(sum(row), total) for row in one["through"]]
+        lines.append([f"`{one['robot']}`", one["engine"], str(total), *shares])
+    return table(["trot of", "engine", "n", *(f"level {level}" for level in range(len(found[0]["through"])))], lines)
 
 
 def _told(through: int, fell: int) -> str:
@@ -214,8 +226,6 @@ def _judged(cell: Cell) -> str:
 
 if __name__ == "__main__":
     pages = ("docs/locomotion.md",)
-    codes = [
-        main(__doc__, name, "walking_table.py", pages, content)
-        for name, content in (("walks", walks), ("seeds", seeds), ("crossings", crossings), ("engines", engines))
-    ]
+    tables = {"walks": walks, "seeds": seeds, "crossings": crossings, "trots": trots, "engines": engines}
+    codes = [main(__doc__, name, "walking_table.py", pages, content) for name, content in tables.items()]
     sys.exit(max(codes))

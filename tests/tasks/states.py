@@ -10,9 +10,10 @@ from anysim.task.env import TaskEnv
 from anysim.task.joints import RangedJointView
 
 
-def blind(task: str, engine: str, num_envs: int = 2, *overrides: str) -> TaskEnv:
-    """A task without its cameras."""
-    return anysim.make(task, engine=engine, num_envs=num_envs, overrides=[*blinding(task), *overrides])
+def blind(task: str, engine: str, num_envs: int = 2, *overrides: str, robot: str | None = None) -> TaskEnv:
+    """A task without its cameras, with the robot in the place of its own."""
+    changes = [*blinding(task), *overrides]
+    return anysim.make(task, engine=engine, num_envs=num_envs, robot=robot, overrides=changes)
 
 
 def blinding(task: str) -> list[str]:

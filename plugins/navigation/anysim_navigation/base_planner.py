@@ -12,6 +12,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 from anysim_navigation.limits import OUTPUTS, BaseKind, BaseLimits, kind_of, limits_of, output_of
 from anysim_navigation.movers import movers_of
+from anysim_navigation.progress import PATIENCE, RECOVERY
 from anysim_navigation.robot_shape import discs_of
 from anysim_navigation.router import BaseRouter, Mode, frame_pose
 from anysim_navigation.way_costs import way_lengths
@@ -37,6 +38,8 @@ class PlannedBase(Base):
         self._labels = tuple(self._slice.controller.labels)
         self.router: BaseRouter | None = None
         self._named: tuple[str, ...] | None = None
+        # it recovers by itself first
+        self.held_up += round((PATIENCE + RECOVERY) / env.engine.world.physics.control_dt)
 
     def foresee(self, movers: Sequence[str]) -> None:
         if self.router is not None:

@@ -18,8 +18,10 @@ MARGIN = 0.15
 """[m] within which a way costs more."""
 
 
-def car_way(mesh: NavMesh, limits: BaseLimits, start: Array, goal: Array) -> list[tuple[Array, float]]:
-    """Stretches (K, 2) [m] with their directions, 1 or -1, from a pose (3,) to a place (2,).
+def car_way(
+    mesh: NavMesh, limits: BaseLimits, start: Array, goal: Array, room: float = 0.0
+) -> list[tuple[Array, float]]:
+    """Stretches (K, 2) [m] with their directions, 1 or -1, from a pose (3,) to a place (2,), `room` [m] from things.
 
     Raises:
         NoRoute: no such way was found.
@@ -37,11 +39,12 @@ def car_way(mesh: NavMesh, limits: BaseLimits, start: Array, goal: Array) -> lis
     field = distances_of((~on_mesh).astype(np.int8), CELL) + mesh.agent.radius  # from the middle of the disc to things
     field = np.where(on_mesh, field, field - 2 * distances_of(on_mesh.astype(np.int8), CELL))
     shifted, end = start - np.array([*middle, 0.0]), goal - middle
-    least = float(limits.discs[:, 2].min())
+    discs = limits.discs + np.array([0.0, 0.0, room])
+    least = float(discs[:, 2].min())
     i, j = ((end[::-1] / CELL) + 0.5 * np.array([rows, columns])).astype(int)
     ahead = hybrid.distances_to(field > least - CELL, int(i), int(j)) * CELL
     near, radius = AT_THE_END, float(limits.turning_radius) * 1.1  # a reserve, with which it can get back onto its way
-    found = hybrid.way_of_a_car(field, CELL, ahead, limits.discs, radius, shifted, end, near, MARGIN)
+    found = hybrid.way_of_a_car(field, CELL, ahead, discs, radius, shifted, end, near, MARGIN)
     if not len(found):
         raise NoRoute(
             f"no way of a car with a turning circle of {limits.turning_radius:g} m from "

@@ -85,7 +85,15 @@ class DynamicWindow:
         return path, aim
 
     def choose(
-        self, field: Array, cell: float, path: Array, aim: Array, now: Array, last: Array, movers: Array | None = None
+        self,
+        field: Array,
+        cell: float,
+        path: Array,
+        aim: Array,
+        now: Array,
+        last: Array,
+        movers: Array | None = None,
+        gear: float = 0.0,
     ) -> Choice:
         """The best velocities, all in the frame of the base.
 
@@ -96,10 +104,14 @@ class DynamicWindow:
             aim: (2,) [m] the point on it that is made for.
             now, last: (3,) the velocity, and what was told last.
             movers: (M, 5) x, y, vx, vy and radius of what moves and is not in the field.
+            gear: 1 for forwards alone, -1 for backwards alone, 0 for both.
         """
         from anysim_navigation.kernels import window
 
         limits, out = self.limits, np.zeros(3)
+        low, high = limits.low.copy(), limits.high.copy()
+        if gear:
+            (high if gear < 0 else low)[0] = 0.0
         cost, clearance = window.choose(
             field,
             float(cell),
@@ -109,8 +121,8 @@ class DynamicWindow:
             np.array(aim, dtype=float),
             np.array(now, dtype=float),
             np.array(last, dtype=float),
-            limits.low,
-            limits.high,
+            low,
+            high,
             limits.acceleration,
             float(limits.turning_radius),
             self._samples,

@@ -28,8 +28,11 @@ from anysim_sensors.occupancy import Grid, occupancy
 from anysim_sensors.sight.eye import Eye
 from anysim_sensors.tables import GeomPoses
 
-ROOM = (0.12, 0.02)
-"""[m] beyond its radius that ways keep from things: as much as makes following them easy, else what fits."""
+ROOM = (0.12, 0.06, 0.04, 0.02)
+"""[m] beyond its radius that ways keep from things: as much as makes following them easy, else what fits.
+
+Gaps that the last alone gets through are mostly too tight to be steered through on a scan with cells of 4 cm.
+"""
 NEAR = 0.35
 """[m] from its end a way is left for the straight line, if that is free."""
 CAR_STOPS = 0.15
@@ -60,7 +63,8 @@ class Errand(NamedTuple):
     steps: int
     replans: int
     progress: Progress | None
-    later: tuple[Array, ...]
+    gear: float
+    later: tuple[tuple[Array, float], ...]
     refused: str | None
 
 
@@ -95,7 +99,7 @@ class BaseRouter:
             NavMaps(world, agent._replace(radius=limits.radius + more), without=(robot.name,)) for more in ROOM
         ]
         height = frame_pose(scene, frame)[2]
-        self._grid = Grid((6.0, 6.0), 0.05, agent.step - height, agent.height - height)
+        self._grid = Grid((6.0, 6.0), 0.04, agent.step - height, agent.height - height)
         self._eye = Eye(scene, frame, "collision", "entity")
         self._movers = Movers(scene, movers)
         self._seen = self._eye.seen & self._eye.geometry.without(self._movers.bodies)
@@ -104,8 +108,10 @@ class BaseRouter:
         self.mode = np.full(n, Mode.STAND, dtype=np.int64)
         self._steps, self._replans = np.zeros((2, n), dtype=np.int64)
         self._progress: list[Progress | None] = [None] * n
-        self._later: list[list[Array]] = [[] for _ in range(n)]
-        """Of a car's way, the stretches beyond its next change of direction."""
+        self._gear = np.zeros(n)
+        """Of a car on its way: 1 forwards, -1 backwards."""
+        self._later: list[list[tuple[Array, float]]] = [[] for _ in range(n)]
+        """Of a car's way, the stretches beyond its next change of direction, and their gears."""
         self.refused: dict[int, str] = {}
 
     def go(self, ids: Array, target: Array, mode: Mode = Mode.ROUTE) -> None:
@@ -149,6 +155,7 @@ class BaseRouter:
                 int(self._steps[env]),
                 int(self._replans[env]),
                 copy(self._progress[env]),
+                float(self._gear[env]),
                 tuple(self._later[env]),
                 self.refused.get(env),
             )
@@ -161,6 +168,7 @@ class BaseRouter:
             self.target[env], self.twist[env], self.mode[env] = one.target, one.twist, one.mode
             self._steps[env], self._replans[env] = one.steps, one.replans
             self._progress[env], self._later[env] = copy(one.progress), list(one.later)
+            self._gear[env] = one.gear
             self.refused.pop(env, None)
             if one.refused is not None:
                 self.refused[env] = one.refused
@@ -220,8 +228,12 @@ class BaseRouter:
         """(K, 2) over the mesh with the most room, or over the tightest that has a way."""
         poses, end = self._scene.state.body_pose[env], self.target[env, :2]
         if self.limits.kind is BaseKind.ACKERMANN:
-            maps = self._maps[-1].at(poses, present)
-            first, *self._later[env] = [path for path, _ in car_way(maps, self.limits, pose, end)]
+            mesh = self._maps[-1].at(poses, present)
+            try:
+                found = car_way(mesh, self.limits, pose, end, room=self._grid.cell)
+            except NoRoute:
+                found = car_way(mesh, self.limits, pose, end)
+            (first, self._gear[env]), *self._later[env] = found
             return first
         for maps in self._maps[:-1]:
             try:
@@ -253,13 +265,15 @@ class BaseRouter:
             self.twist[env] = self._pose_control.twist(way, P.wrapped(self.target[env, 2] - pose[2]), self.twist[env])
             return
         if self._later[env] and progress.left < CUSP:
-            progress = self._progress[env] = Progress(self._later[env].pop(0))
+            path, self._gear[env] = self._later[env].pop(0)
+            progress = self._progress[env] = Progress(path)
             progress.look(pose[:2], 0.0)
         path, aim = self.window.ahead(progress, pose, field, cell)
+        gear = float(self._gear[env])
         if progress.recovering > 0:
-            aim = _roomiest(field, cell)
+            aim, gear = _roomiest(field, cell), 0.0
             path = aim[None]
-        choice = self.window.choose(field, cell, path, aim, now, self.twist[env], movers)
+        choice = self.window.choose(field, cell, path, aim, now, self.twist[env], movers, gear)
         self.twist[env] = choice.twist
         if self.limits.kind in (BaseKind.DIFFERENTIAL,) and np.isfinite(choice.cost) and not choice.twist.any():
             bearing = float(np.arctan2(aim[1], aim[0]))

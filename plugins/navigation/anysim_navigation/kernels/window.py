@@ -116,6 +116,7 @@ def choose(
     steps = round(horizon / step)
     here = clearance(field, cell, discs, movers, 0.0, 0.0, 0.0, 0.0)
     floor = min(0.0, here) - 1e-9  # what is too near already may go, but not nearer
+    fastest_way = max(high[0], -low[0])
     best, out[0], out[1], out[2] = np.inf, 0.0, 0.0, 0.0
     bottom, top = np.empty(3), np.empty(3)
     for k in range(3):
@@ -175,7 +176,7 @@ def choose(
                     + weights[GOAL] * left
                     + weights[OBSTACLE] * (near / steps + 4.0 * hit)
                     + weights[OSCILLATION] * flips
-                    + weights[VELOCITY] * (1.0 - speed / high[0])
+                    + weights[VELOCITY] * (1.0 - speed / fastest_way)
                     + weights[HEADING] * off
                 )
                 if cost < best:

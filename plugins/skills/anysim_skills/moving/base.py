@@ -29,6 +29,9 @@ GAIN = 4.0
 BACKWARDS = 0.3
 """[m] what lies behind a differential base and is not further away is reached backwards."""
 
+HELD_UP = 75
+"""Control steps in which a base that is not at its goal has neither come nearer nor turned: something holds it."""
+
 _BASES: PerEnv[tuple[str, str, str, str], "Base"] = PerEnv()
 
 
@@ -51,6 +54,7 @@ class Base(Mover):
         pace: how fast.
         close: [m] from there the rest of the way is not worth another turn.
         no_way: (N,) bool, whether its planner has found none.
+        held_up: control steps in which it neither comes nearer nor turns, after which something holds it.
     """
 
     drives: ClassVar[tuple[tuple[str, ...], ...]] = (HOLONOMIC, DIFFERENTIAL)
@@ -72,7 +76,7 @@ class Base(Mover):
             )
         self.sideways = labels == HOLONOMIC
         self.target, self.no_way = np.zeros((env.num_envs, 3)), np.zeros(env.num_envs, dtype=bool)
-        self.pace, self.close = Pace(), 0.01
+        self.pace, self.close, self.held_up = Pace(), 0.01, HELD_UP
         self._fresh = np.ones(env.num_envs, dtype=bool)
         self._mode = np.zeros(env.num_envs, dtype=np.int64)
         self._ahead = np.ones(env.num_envs)

@@ -18,8 +18,6 @@ from anysim_skills.grasping.grasp import Metres
 from anysim_skills.moving.base import Base, Pace
 from anysim_skills.recovery.way_around import WayAround
 
-HELD_UP = 75
-"""Control steps in which a base that is not at its goal has neither come nearer nor turned: something holds it."""
 NEARER = 0.01
 """[m, rad] what counts as nearer."""
 STOPPED = 0.02
@@ -135,7 +133,7 @@ class DriveTo(PhasedSkill):
         moved = (distance < self._best[ids] - NEARER) | (rate > NEARER * 5) | (speed > NEARER * 5)
         self._best[ids] = np.where(moved, np.minimum(distance, self._best[ids]), self._best[ids])
         self._nearest[ids] = np.where(moved, self.steps[ids], self._nearest[ids])
-        return self.steps[ids] - self._nearest[ids] > HELD_UP
+        return self.steps[ids] - self._nearest[ids] > self.base.held_up
 
 
 class Navigate(DriveTo):
