@@ -14,8 +14,9 @@ _BEGUN: dict[int, Array] = {}
 
 
 def towel(env: TaskEnv) -> Garment:
+    """The one garment of a task."""
     assert env.families is not None
-    found = env.families.family("towel")
+    found = env.families.family("shirt" if env.spec.world.name == "fold_shirt" else "towel")
     assert isinstance(found, Garment)
     return found
 
@@ -67,6 +68,15 @@ def folded(env: TaskEnv) -> Array:
     return _lying(env, flat)
 
 
+def shirt_folded(env: TaskEnv) -> Array:
+    """Its sleeves in, and its hem on its shoulders."""
+    flat = towel(env).cut.points.copy()
+    side = np.abs(flat[:, 0])
+    flat[:, 0] = np.sign(flat[:, 0]) * np.where(side > 0.11, 0.22 - side, side)
+    flat[:, 1] = np.abs(flat[:, 1])
+    return _lying(env, flat)
+
+
 def shift(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[[TaskEnv], None]:
     """All of it moved in the world's axes."""
     return lambda env: put_towel(env, towel(env).x + np.array([x, y, z]))
@@ -90,6 +100,11 @@ def turn_up(env: TaskEnv) -> None:
     places = it.x.copy()
     places[:, corner, :2] += 0.12
     put_towel(env, places)
+
+
+def lay_flat(env: TaskEnv) -> None:
+    """As it was cut."""
+    put_towel(env, spread(env))
 
 
 def take_hold(env: TaskEnv) -> None:

@@ -25,7 +25,11 @@ class ClothCarry(PhasedSkill):
     """Carry the point `at` of `cloth`, which `robot` holds, to where it is to lie.
 
     That is `goal`, or over the point `onto` of the same cloth, or where it would be if the cloth lay flat with the
-    points `by` where they are. The way is an arc, a half circle where `arc` is 1.
+    points `by` where they are, or without any of these as most of it lies. The way is an arc, a half circle where
+    `arc` is 1.
+
+    Attributes:
+        numbers: (N,) of the point in each env; others may choose it.
     """
 
     def __init__(
@@ -46,11 +50,14 @@ class ClothCarry(PhasedSkill):
         speed: Speed = 0.2,
     ) -> None:
         """`above` the place the way ends."""
-        if (goal is not None) + (onto is not None) + bool(by) != 1 or len(by) == 1:
-            raise TaskError("cloth_carry goes to one of `goal: FRAME`, `onto: [U, V]` and `by: [[U, V], [U, V]]`")
+        if (goal is not None) + (onto is not None) + bool(by) > 1 or len(by) == 1:
+            raise TaskError(
+                "cloth_carry goes to one of `goal: FRAME`, `onto: [U, V]` and `by: [[U, V], [U, V]]`; without any to "
+                "where the point would lie as most of the cloth does"
+            )
         self.arm, self.cloth = Arm.of(env, robot, tool=tool, solver=solver), Cloth(env.scene, cloth)
         self._goal, self._above, self._beyond, self._arc, self._speed = goal, above, beyond, arc, speed
-        self._number = int(self.cloth.nearest([at])[0])
+        self.numbers = np.full(env.num_envs, self.cloth.nearest([at])[0])
         self._onto = None if onto is None else int(self.cloth.nearest([onto])[0])
         self._by = self.cloth.nearest(by) if by else np.zeros(0, dtype=int)
         n = env.num_envs
@@ -68,9 +75,11 @@ class ClothCarry(PhasedSkill):
             last = self._goal.position[at]
         elif self._onto is not None:
             last = points[:, self._onto]
+        elif len(self._by) == 0:
+            last = self.cloth.as_most_lies(points)[np.arange(len(ids)), self.numbers[ids]]
         else:
-            last = self.cloth.laid_out(self._number, self._by, points)
-        way = last[:, :2] - points[:, self._number, :2]
+            last = self.cloth.laid_out(self.numbers[ids], self._by, points)
+        way = last[:, :2] - points[np.arange(len(ids)), self.numbers[ids], :2]
         last = last.copy()
         last[:, :2] += self._beyond * way / np.maximum(P.norm(way), 1e-9)[:, None]
         last[:, 2] += self._above

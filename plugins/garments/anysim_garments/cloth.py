@@ -20,6 +20,13 @@ Spot = Annotated[
 ]
 CELL = 0.01
 """[m] of the grid on which covered area is counted."""
+NEAR = 0.015
+"""[m] within which a point lies as it should."""
+ASIDE = 0.012
+"""[m] that a hand may come down beside the point that it is to hold."""
+_TURNS = np.arange(16) * np.pi / 8
+ASIDES = np.concatenate([np.zeros((1, 2)), ASIDE * np.stack([np.cos(_TURNS), np.sin(_TURNS)], axis=1)])
+"""(17, 2) [m] places that are tried."""
 
 
 class Cloth:
@@ -55,14 +62,34 @@ class Cloth:
         away = (self.flat[None] - np.array(spots)[:, None]) * self._half
         return np.argmin(P.norm(away), axis=1)
 
+    def aim(self, numbers: Array, points: Array, above: float) -> Array:
+        """(n, 3) [m] places `above` points `numbers` (n,), of points (n, V, 3), for a hand that is to hold just these.
+
+        Where another layer is nearer to a hand straight above, it comes down beside the point.
+        """
+        rows = np.arange(len(points))
+        asides = np.concatenate([ASIDES, np.full((len(ASIDES), 1), above)], axis=1)
+        away = points - points[rows, numbers, None]
+        others = P.norm(away[:, :, None] - asides)  # (n, V, directions)
+        others[rows, numbers] = np.inf
+        lead = others.min(axis=1) - P.norm(asides)
+        return points[rows, numbers] + asides[np.argmax(lead, axis=1)]
+
+    def holds(self, at: Array, numbers: Array) -> Array:
+        """(n,) bool: a pad holds points `numbers` (n,) in the rows `at` of the scene."""
+        return self.state().fields["held"][at, numbers]
+
     def held_near(self, places: Array, within: float = 0.06) -> Array:
         """(n,) bool: a pad holds it at a point within so much [m] of places (n, 3)."""
         state = self.state()
         near = P.norm(state.points - places[:, None]) < within
         return np.logical_or.reduce(near & state.fields["held"], axis=1)
 
-    def laid_out(self, number: int, by: Array, points: Array) -> Array:
-        """(n, 3) where a point would be if it lay flat with points `by` (b,) where they are; of points (n, V, 3)."""
+    def laid_out(self, numbers: Array, by: Array, points: Array) -> Array:
+        """(n, 3) where points `numbers` (n,) would be if they lay flat with points `by` (b,) where they are.
+
+        Of points (n, V, 3).
+        """
         flat = self.flat * self._half
         here, there = points[:, by, :2], flat[by]
         middle, origin = here.mean(axis=1), there.mean(axis=0)
@@ -70,9 +97,37 @@ class Cloth:
         cosine = (a * b).sum(axis=(1, 2))
         sine = (a[:, 0] * b[..., 1] - a[:, 1] * b[..., 0]).sum(axis=1)
         turn = np.arctan2(sine, cosine)
-        x, y = flat[number] - origin
+        x, y = (flat[numbers] - origin).T
         place = np.stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y], axis=1)
         return np.column_stack([middle + place, points[:, by, 2].mean(axis=1)])
+
+    def as_most_lies(self, points: Array) -> Array:
+        """(n, V, 3) where all points would be if they lay flat as most of them do already, of points (n, V, 3).
+
+        Each triangle says where the others would be, one side up or the other; the one with which most agree is right.
+        """
+        one, found = self.flat * self._half @ np.array([1.0, 1.0j]), points[..., 0] + 1j * points[..., 1]
+        laid = np.empty_like(points)
+        for row, here in enumerate(found):
+            best = (-1, one, np.zeros(len(one), dtype=bool))
+            for flat in (one, one.conj()):
+                place = _fitted(flat, here, self.faces)
+                near = np.abs(place - here) < NEAR
+                most = int(np.argmax(near.sum(axis=1)))
+                best = max(best, (int(near[most].sum()), flat, near[most]), key=lambda said: said[0])
+            _, flat, agrees = best
+            place = _fitted(flat, here, np.flatnonzero(agrees)[None])[0]
+            laid[row] = np.stack([place.real, place.imag, np.full(len(place), points[row, agrees, 2].mean())], axis=1)
+        return laid
+
+
+def _fitted(flat: Array, here: Array, groups: Array) -> Array:
+    """(g, V) where points (V,), complex, are if they lie as groups of them (g, k) are `here`."""
+    a, b = flat[groups], here[groups]
+    origin, middle = a.mean(axis=1), b.mean(axis=1)
+    turn = ((a - origin[:, None]).conj() * (b - middle[:, None])).sum(axis=1)
+    turn /= np.maximum(np.abs(turn), 1e-12)
+    return middle[:, None] + turn[:, None] * (flat - origin[:, None])
 
 
 def covered(points: Array, faces: Array, cell: float = CELL) -> Array:

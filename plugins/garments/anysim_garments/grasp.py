@@ -27,6 +27,9 @@ class ClothGrasp(PhasedSkill):
     """Take hold of `cloth` with `robot` at a point of it, from above, and lift that by `lift`; missed once, again.
 
     The hand is one of the garment's pads, and turned as it is at home.
+
+    Attributes:
+        numbers: (N,) of the point in each env; others may choose it.
     """
 
     def __init__(
@@ -46,7 +49,7 @@ class ClothGrasp(PhasedSkill):
         """`above` the point the hand closes."""
         self.arm, self.cloth = Arm.of(env, robot, tool=tool, solver=solver), Cloth(env.scene, cloth)
         self.arm.check_gripper()
-        self._number = int(self.cloth.nearest([at])[0])
+        self.numbers = np.full(env.num_envs, self.cloth.nearest([at])[0])
         self._above, self._hover, self._lift, self._speed = above, hover, lift, speed
         super().__init__(env, [self.arm])
 
@@ -63,8 +66,8 @@ class ClothGrasp(PhasedSkill):
 
     def _over(self, ids: Array, at: Array, above: float) -> Array:
         """(n, 7) the hand so far above the point."""
-        place = self.cloth.state().points[at, self._number]
-        return np.column_stack([place + np.array([0.0, 0.0, above]), self.arm.home(ids)[:, 3:]])
+        place = self.cloth.aim(self.numbers[ids], self.cloth.state().points[at], above)
+        return np.column_stack([place, self.arm.home(ids)[:, 3:]])
 
     def _open(self, ids: Array, at: Array) -> None:
         del at
@@ -84,7 +87,7 @@ class ClothGrasp(PhasedSkill):
         self.arm.stay(ids)
 
     def _closing(self, ids: Array, at: Array) -> Array:
-        held = self.cloth.held_near(self.arm.tool.position)[at]
+        held = self.cloth.holds(at, self.numbers[ids])
         still = (self.steps[ids] >= 10) & (self.arm.finger_speed(ids) < CLOSED)
         over = (still & ~held) | (self.steps[ids] >= CLOSING_STEPS)
         return np.where(held & still, GO_ON, np.where(over, _MISSED, STAY))

@@ -45,8 +45,8 @@ def fastest(matrix: Array, shares: Array) -> float:
 
 def bending_force(
     matrix: Array, rigidity: float, damping: float, mass: Array, h: float
-) -> Callable[[Array, Array], Array] | None:
-    """Forces (V, 3) [N] on points from places and velocities (V, 3) at the beginning of a step of `h` [s].
+) -> Callable[[int, Array, Array], Array] | None:
+    """Forces (V, 3) [N] on points, as `FlexSource.inner`, from what is so at the beginning of a step of `h` [s].
 
     What damps is that of the step's end, as if nothing else acted. A mass of inf [kg] is of a point that does not move.
     """
@@ -54,4 +54,4 @@ def bending_force(
         return None
     stiff = -rigidity * matrix
     slowed = np.linalg.solve(np.eye(len(mass)) - h * damping * stiff / mass[None, :], damping * stiff)
-    return lambda places, velocities: stiff @ places + slowed @ velocities
+    return lambda _, places, velocities: stiff @ places + slowed @ velocities

@@ -75,10 +75,14 @@ class Deformable(Soft):
         return self.parameter("density", env) * float(np.prod(self.soft.box))
 
 
-def contact_of(friction: float, dt: float) -> str:
-    """How a flex touches: as it says, whatever it meets, but that the larger coefficient of friction acts."""
+def contact_of(friction: float, dt: float, *, itself: bool = False) -> str:
+    """How a flex touches: as it says, whatever it meets, but that the larger coefficient of friction acts.
+
+    With `itself`, also where parts of it come to lie on each other.
+    """
+    touches = 'selfcollide="auto" contype="1"' if itself else 'selfcollide="none" contype="0"'
     return (
-        f'<contact selfcollide="none" contype="0" conaffinity="1" solmix="1e6" friction="{friction!r}" '
+        f'<contact {touches} conaffinity="1" solmix="1e6" friction="{friction!r}" '
         f'solref="{2 * dt!r} 1" solimp="{SOLIMP}"/>'
     )
 

@@ -2,7 +2,7 @@
 
 import os
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import ClassVar
 
@@ -56,10 +56,6 @@ class Soft(CoSolver):
     def attached_sides(self) -> Sequence[tuple[str, str]]:
         """Which sides of it are held by which bodies."""
         return ()
-
-    def inside(self, env: int) -> Callable[[SubWorld], Array] | None:
-        """What gives forces of the matter on itself that the solver does not know, once a step of it."""
-        return None
 
     def slots(self) -> Slots:
         """What bodies may take hold of it while an episode lasts, and which ones do not touch it."""
@@ -212,7 +208,7 @@ class Soft(CoSolver):
             sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
             sub.place()
             self.before_solve(env, sub)
-            done = sub.step(self.soft.substeps, self.parameter("drag", env), self.inside(env))
+            done = sub.step(self.soft.substeps, self.parameter("drag", env), env)
             self.after_solve(env, sub)
             self.received[env] += done.received
             self.state_row[env], self.moved[env] = sub.state(), sub.momentum()

@@ -16,7 +16,7 @@ from anysim.families.cosolver import MetBodies
 from anysim.math import pose as P
 from anysim_soft.bending import bending_force, bending_matrix, fastest
 from anysim_soft.deformable import contact_of, numbers, on_side
-from anysim_soft.family import Soft
+from anysim_soft.family import UP, Soft
 from anysim_soft.garment_cut import Cut, cut_of
 from anysim_soft.garment_spec import GarmentSpec
 from anysim_soft.pads import Pads
@@ -45,7 +45,15 @@ class Garment(Soft):
     spec = GarmentSpec
     label = "garment"
     tint = (0.8, 0.45, 0.35)
-    drawn_keys: ClassVar[tuple[str, ...]] = (*Soft.drawn_keys, "areal_density", "bending", "damping", "folded")
+    drawn_keys: ClassVar[tuple[str, ...]] = (
+        *Soft.drawn_keys,
+        "areal_density",
+        "bending",
+        "damping",
+        "folded",
+        "turned",
+        "tilt",
+    )
 
     def __init__(self, setting: FamilySetting) -> None:
         assert isinstance(setting.spec, GarmentSpec)
@@ -100,26 +108,36 @@ class Garment(Soft):
             fixed |= on_side(cut.points, size, side)
         mass = values["areal_density"] * cut.shares()
         points = pose[:3] + P.rotate(pose[3:], flat)
+        touch = contact_of(values["friction"], self._step, itself=spec.layers)
         xml = (
             f'<flexcomp name="it" type="direct" dim="2" point="{numbers(points.ravel())}" '
             f'element="{" ".join(map(str, cut.faces.ravel()))}" radius="{spec.radius!r}" mass="{float(mass.sum())!r}">'
-            f"{edges(self._step, EDGE)}{contact_of(values['friction'], self._step)}</flexcomp>"
+            f"{edges(self._step, EDGE)}{touch}</flexcomp>"
         )
-        start = pose[:3] + P.rotate(pose[3:], self._folded(flat, values["folded"])) if values["folded"] > 0 else None
+        begins = self._begins(flat, values["folded"], values["turned"], values["tilt"])
+        start = None if begins is None else pose[:3] + P.rotate(pose[3:], begins)
         felt = np.where(fixed, np.inf, mass)
         inner = bending_force(self._matrix, values["bending"], values["damping"], felt, self._step)
         sides = {side: on_side(cut.points, size, side) for side in spec.attached}
         return FlexSource(xml, fixed, mass, OPTIONS, sides, start=start, inner=inner)
 
-    def _folded(self, flat: Array, share: float) -> Array:
-        """(V, 3) [m] in its frame, with a share of it folded back about a line along y."""
-        width = self.cut.size[0]
-        beyond = np.maximum(flat[:, 0] - (width / 2 - share * width), 0.0)
+    def _begins(self, flat: Array, share: float, turned: float, tilt: float) -> Array | None:
+        """(V, 3) [m] where points begin in its frame; None if that is where they are in `flat`.
+
+        Turned in its plane, a share of its extent along x folded back about a line along y, and tilted about y.
+        """
+        if not (share or turned or tilt):
+            return None
+        places = P.rotate(P.from_axis_angle(UP, np.array(turned)), flat)
+        width = np.ptp(places[:, 0])
+        beyond = np.maximum(places[:, 0] - (places[:, 0].max() - share * width), 0.0)
         bend = self.garment.spacing
         turn = np.minimum(beyond / bend, np.pi)
-        places = flat.copy()
         places[:, 0] += bend * np.sin(turn) - beyond - np.maximum(beyond - np.pi * bend, 0.0)
-        places[:, 2] = bend * (1.0 - np.cos(turn)) + np.cos(turn) * flat[:, 2]
+        places[:, 2] = bend * (1.0 - np.cos(turn)) + np.cos(turn) * places[:, 2]
+        if tilt:
+            places = P.rotate(P.from_axis_angle(np.array([0.0, -1.0, 0.0]), np.array(tilt)), places)
+            places[:, 2] -= places[:, 2].min()
         return places
 
     def attached_sides(self) -> list[tuple[str, str]]:

@@ -59,7 +59,17 @@ class GarmentSpec(SoftSpec):
     folded: Value[Share] = Field(
         default=0.0, description="share of its extent along x that lies folded over the rest when an episode begins"
     )
+    turned: Value[float] = Field(
+        default=0.0, description="how far it is turned in its plane when an episode begins, before it is folded [rad]"
+    )
+    tilt: Value[float] = Field(
+        default=0.0, description="how far that plane then stands up, about y, its lowest point at its frame [rad]"
+    )
     radius: Positive = Field(default=0.003, description="[m] from its middle at which contacts act")
+    layers: bool = Field(
+        default=False,
+        description="whether parts that lie on each other touch, twice the radius apart; a pad then holds one point",
+    )
     fixed: tuple[Edge, ...] = Field(
         default=(), description="sides or corners of its outline that stay where they begin"
     )
@@ -72,4 +82,10 @@ class GarmentSpec(SoftSpec):
     def _one_form(self) -> Self:
         if (self.towel is None) == (self.shirt is None):
             raise KeyFault("give one of `towel: [WIDTH, LENGTH]` and `shirt: {}`", "towel")
+        if self.layers and (wide := [name for name, pad in self.pads.items() if pad.points > 1]):
+            raise KeyFault(
+                f"layers that touch are pressed into each other between the points that the pad '{wide[0]}' holds, and "
+                f"the cloth comes apart; give it `points: 1`",
+                "layers",
+            )
         return self

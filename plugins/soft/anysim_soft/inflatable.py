@@ -5,7 +5,7 @@ the share of what is due that an implicit step would take, with the mass that th
 which the skin breathes is taken out of it in each step. At rest the law holds exactly.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -94,7 +94,19 @@ class Inflatable(Soft):
         def adjust(model: mujoco.MjModel) -> None:
             model.flex_stiffness.reshape(-1, 21)[:, :6] = membrane(model, young, poisson, thickness)
 
-        return FlexSource(xml, np.zeros(len(points), dtype=bool), mass, options, {}, adjust)
+        def press(env: int, x: Array, v: Array) -> Array:
+            h = self._step
+            now, slope = volume(x, faces), slopes(x, faces)
+            yields = h * h * float((P.dot(slope, slope) / mass).sum())  # [m^3/Pa] by inertia alone, in a step
+            swells = float((slope * v).sum())
+            absolute = AIR + self.pressure[env]
+            share = now / (now + absolute * yields)
+            due = self.gas[env] / now - absolute - absolute / now * swells * h
+            self.pressure[env] += share * due
+            acts = self.pressure[env] - DAMPED * h / yields * swells
+            return acts * slope + self.wet[env] / (h * self.soft.substeps)
+
+        return FlexSource(xml, np.zeros(len(points), dtype=bool), mass, options, {}, adjust, inner=press)
 
     # ------------------------------------------------------------------ its life
 
@@ -117,23 +129,6 @@ class Inflatable(Soft):
             self.state_row[env], self.x[env] = sub.state(), sub.points()
             self.pressure[env] = pressure
             self.gas[env] = (AIR + pressure) * volume(self.x[env], self._faces)
-
-    def inside(self, env: int) -> Callable[[SubWorld], Array]:
-        """What gives the forces (V, 3) [N] of gas and liquids on the skin, once a step of the solver."""
-
-        def press(sub: SubWorld) -> Array:
-            x, v, h = sub.node_places(), sub.node_speeds(), sub.model.opt.timestep
-            now, slope = volume(x, self._faces), slopes(x, self._faces)
-            yields = h * h * float((P.dot(slope, slope) / sub.mass).sum())  # [m^3/Pa] by inertia alone, in a step
-            swells = float((slope * v).sum())
-            absolute = AIR + self.pressure[env]
-            share = now / (now + absolute * yields)
-            due = self.gas[env] / now - absolute - absolute / now * swells * h
-            self.pressure[env] += share * due
-            acts = self.pressure[env] - DAMPED * h / yields * swells
-            return acts * slope + self.wet[env] / (h * self.soft.substeps)
-
-        return press
 
     def after_solve(self, env: int, sub: SubWorld) -> None:
         self.wet[env] = 0.0

@@ -39,7 +39,8 @@ class FlexSource(NamedTuple):
         sides: (V,) bool by name, the nodes there that bodies hold.
         adjust: changes the model once it is made.
         start: (V, 3) [m] where points begin, if they are not stress-free there.
-        inner: forces (V, 3) [N] of its points on each other, from their places and velocities (V, 3).
+        inner: forces (V, 3) [N] of its points on each other that the solver does not know, from the env whose memory
+            they may read and change, and their places and velocities (V, 3), once a step of the solver.
     """
 
     xml: str
@@ -49,7 +50,7 @@ class FlexSource(NamedTuple):
     sides: Mapping[str, Array] = MappingProxyType({})
     adjust: Callable[[Any], None] | None = None
     start: Array | None = None
-    inner: Callable[[Array, Array], Array] | None = None
+    inner: Callable[[int, Array, Array], Array] | None = None
 
 
 class Joint(NamedTuple):
@@ -207,10 +208,6 @@ class SubWorld:
         """(V, 3) [m] the nodes."""
         return self.data.xpos[self.nodes].copy()
 
-    def node_speeds(self) -> Array:
-        """(V, 3) [m/s] of nodes that all move."""
-        return self.data.qvel[self._dofs].copy()
-
     def stretch(self, factor: float) -> None:
         """Put nodes that all move to `factor` times their distance from their middle, from the beginning."""
         places = self.node_places()
@@ -255,20 +252,15 @@ class SubWorld:
         found[place[data.efc_id[rows[::3]]]] = data.efc_force[rows].reshape(-1, 3)
         return found
 
-    def step(self, substeps: int, drag: float, inside: Callable[["SubWorld"], Array] | None = None) -> Outcome:
-        """Move on by `substeps` steps, from a state that was loaded.
-
-        `inside` gives forces (V, 3) [N] between nodes that all move, which sum up to nothing.
-        """
+    def step(self, substeps: int, drag: float, env: int = 0) -> Outcome:
+        """Move on by `substeps` steps, from a state that was loaded; `env` is what its inner forces are told."""
         model, data, h = self.model, self.data, self.model.opt.timestep
         impulse, received = np.zeros((len(self._pose), 6)), np.zeros(6)
         slower = (1.0 - np.exp(-drag * h)) / h
         for _ in range(substeps):
             before = self.momentum() if self._pinned else np.zeros(6)
             at, air = data.xpos[self._moving].copy(), -slower * self.mass[:, None] * data.qvel[self._dofs]
-            data.qfrc_applied[self._dofs] = air if inside is None else air + inside(self)
-            if self.source.inner is not None:
-                data.qfrc_applied[self._dofs] += self._inner()
+            data.qfrc_applied[self._dofs] = air if self.source.inner is None else air + self._inner(env)
             turn, centre = data.xmat[self._proxies].reshape(-1, 3, 3), data.xipos[self._proxies]
             arm = centre - data.xpos[self._proxies]
             mujoco.mj_step1(model, data)
@@ -284,12 +276,12 @@ class SubWorld:
         data.qfrc_applied[:] = 0.0
         return Outcome(impulse, received)
 
-    def _inner(self) -> Array:
+    def _inner(self, env: int) -> Array:
         """(M, 3) [N] of the points on each other, those that move."""
         assert self.source.inner is not None
         velocity, moving = np.zeros((len(self.nodes), 3)), self.model.body_dofnum[self.nodes] > 0
         velocity[moving] = self.data.qvel[self._dofs]
-        return self.source.inner(self.data.xpos[self.nodes], velocity)[moving]
+        return self.source.inner(env, self.data.xpos[self.nodes], velocity)[moving]
 
     def _even_contacts(self) -> None:
         """Make the rows of contacts push the flex as much as what it touches.

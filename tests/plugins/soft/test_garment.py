@@ -152,6 +152,30 @@ def test_it_begins_folded_as_it_is_asked_to():
         assert it.x[..., 2].max() < 0.06
 
 
+def test_layers_lie_on_each_other_where_they_touch():
+    """Twice the radius above, and what it weighs and how it moves as one is as before; without, in each other."""
+    cloth = {"kind": "garment", "towel": [0.2, 0.1], "spacing": 0.025, "folded": 0.45, "position": [0.0, 0.0, 0.004]}
+    highs = {}
+    for layers in (False, True):
+        with begun(run_of({**cloth, "damping": 0.05, "drag": 3.0, "layers": layers})) as (env, it):
+            for _ in range(40):
+                env.step(np.zeros((1, 0)))
+            edge = it.cut.points[:, 0] > 0.1 - 1e-9
+            highs[layers] = it.x[0, edge, 2].mean() - it.x[0, :, 2].min()
+            found = it.balance(ALL)
+            assert np.abs((found.now - found.begun - found.received)[0, :3]).max() < 1e-9
+    assert highs[False] < 0.002
+    assert 0.005 < highs[True] < 0.008
+
+
+def test_it_begins_turned_in_its_plane_and_tilted():
+    cloth = {"kind": "garment", "towel": [0.2, 0.1], "spacing": 0.05, "position": [0.0, 0.0, 0.3]}
+    with begun(run_of({**cloth, "turned": np.pi / 2, "tilt": np.pi / 2})) as (_, it):
+        assert np.ptp(it.x[0], axis=0) == pytest.approx([0.0, 0.2, 0.1], abs=1e-9)
+        assert it.x[0, :, 2].min() == pytest.approx(0.3)
+        assert it.x[0, np.argmin(it.cut.points[:, 1]), 2] == pytest.approx(0.4)
+
+
 SHEET = {"kind": "garment", "towel": [0.1, 0.1]}
 
 
@@ -163,6 +187,7 @@ SHEET = {"kind": "garment", "towel": [0.1, 0.1]}
         ({"spacing": 0.001}, r"families\.it\.spacing.*points"),
         ({"bending": 0.1}, r"families\.it\.bending.*too stiff.*substeps"),
         ({"folded": 0.9}, r"families\.it\.folded"),
+        ({"layers": True, "pads": {"hand": PAD}}, r"families\.it\.layers.*pad 'hand' holds.*points: 1"),
         ({"young": 1e5}, r"families\.it\.young"),
         ({"towel": None, "shirt": {"neck": [0.5, 0.05]}}, r"shirt\.neck"),
         ({"pads": {"hand": {**PAD, "joint": "panda.none"}}}, r"pads\.hand.*panda\.none.*did you mean"),

@@ -1,0 +1,1 @@
+"""Spread a towel that lies folded."""
