@@ -21,9 +21,7 @@ from anysim_mujoco.mjcf import unheld
 
 PLANE, THICK = 20.0, 0.5
 """[m] Half the edge of a box in the place of a plane without a size, and half its thickness."""
-_COPIED = (
-    "name", "rgba", "friction", "contype", "conaffinity", "condim", "priority", "solref", "solimp", "material", "group"
-)  # fmt: skip
+_COPIED = "name rgba friction contype conaffinity condim priority solref solimp material group".split()
 
 
 def bodies_of(spec: Any) -> dict[str, Any]:
