@@ -51,7 +51,7 @@ KINDS: Mapping[str, str] = {
 """The kinds that anysim looks up, and what each is."""
 
 _OFFERS: Mapping[str, Mapping[str, str]] = {
-    "anysim-adapters": {"commands": "openenv"},
+    "anysim-adapters": {"commands": "openenv openpi"},
     "anysim-agents": {"commands": "mcp"},
     "anysim-annotation": {
         "annotators": "affordance boxes_2d boxes_3d camera depth eef_waypoint flow instance nav_point normals obj_bbox"

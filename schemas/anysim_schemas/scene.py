@@ -10,7 +10,6 @@ from pydantic import Field, ValidationError
 
 from anysim_schemas.base import Spec
 from anysim_schemas.errors import AnysimError
-from anysim_schemas.merging import merge
 from anysim_schemas.nodes import Fault, Mark, Node, from_data
 from anysim_schemas.object_source import PACKAGES
 from anysim_schemas.shapes import Shapes
@@ -78,6 +77,8 @@ def with_scene(root: Node, read: SceneReader | None, shapes: Shapes, faults: lis
         faults.append(Fault(source.place, "world.source", str(error)))
         return root
     told = from_data({"world": {"source": {"notes": [list(note) for note in scene.notes]}}}, source.mark)
+    from anysim_schemas.merging import merge  # which reads YAML, as worlds that are data do not
+
     return merge(merge(_tree(scene.entries), root, shapes), told, shapes)
 
 

@@ -154,10 +154,10 @@ class TerrainSpec(ReliefSpec):
     ] = Field(default="plane", description="what the ground is")
     friction: Number = Field(default=0.8, ge=0, description="sliding friction coefficient")
     restitution: Number = Field(default=0.0, ge=0, lt=1, description="ratio of speeds after and before a bounce")
-    margin: Number = Field(
-        default=0.0,
+    margin: Number | None = Field(
+        default=None,
         ge=0,
-        description="distance [m] above the ground from which on it pushes, where the engine has compliance",
+        description="distance [m] above the ground from which on it pushes (0), where the engine has compliance",
     )
     color: ColorValue = Field(
         default=(0.45, 0.47, 0.5), description="red, green, blue in [0, 1], a name, or a value drawn in each episode"

@@ -178,7 +178,7 @@ def test_the_picture_marks_the_diverging_step() -> None:
 
 def test_an_unknown_path_lists_what_there_is(tmp_path: Path) -> None:
     error = called("--factor", "objects.cube.frction=0.2", "--out", tmp_path / "run", code=1)
-    assert "did you mean 'objects.cube.friction'? What can: layout." in str(error)
+    assert "did you mean 'objects.cube.friction'? What can: robots." in str(error)
     assert not (tmp_path / "run").exists()
 
 
