@@ -38,7 +38,7 @@ CAR_STOPS = 0.15
 CUSP = 0.05
 """[m] before it changes its direction a car may do so."""
 REPLANS = 12
-"""Ways in a row that did not bring a base nearer to its end before it gives up; a third of them where nobody moves."""
+"""Ways in a row that did not bring a base nearer to its end before it gives up; a quarter where nobody moves."""
 NEARER = 0.1
 """[m] of the way that count as nearer."""
 SNAP = 0.6
@@ -188,7 +188,7 @@ class BaseRouter:
                 self._replans[env], self._least[env] = 0, left
             if not progress.stale or progress.recovering > 0:
                 return
-        if self._replans[env] > (REPLANS if self._movers.names else REPLANS // 3):
+        if self._replans[env] > (REPLANS if self._movers.names else REPLANS // 4):
             self._refuse(env, "the base does not get on along any way that it has tried")
             return
         try:

@@ -47,8 +47,8 @@ def test_cars_and_legs_get_through_as_well(base: str, room: int) -> None:
     assert (found.ended, found.hardest < HARD) == ("success", True)
 
 
-def walled(gap: bool) -> TaskEnv:
-    """A goal behind a wall, which is 8 m long or has a passage at its side."""
+def walled(gap: bool, slit: float = 0.0) -> TaskEnv:
+    """A goal behind a wall, which is 8 m long or has a passage at its side; beside it there may be a slit [m]."""
     require_engine("mujoco")
     wall = [
         f"world.objects.wall={{source: {{box: [0.1, {3.0 if gap else 8.0}, 1.0]}}, fixed: true}}",
@@ -56,8 +56,15 @@ def walled(gap: bool) -> TaskEnv:
         "world.layout.spot={position: [2.0, 0.0, -0.02], yaw: 0.0, checked: false}",
         "task.expert.planner=dynamic_window",
         "task.on_success=continue",
+        "task.horizon=1200",
     ]
     if not gap:  # and walls from there to behind the goal
+        wall[0:2] = [
+            f"world.objects.wall={{source: {{box: [0.1, {4.0 - slit}, 1.0]}}, fixed: true}}",
+            f"world.layout.wall={{position: [1.0, {2.0 + slit / 2}, 0.5]}}",
+            "world.objects.other={source: {box: [0.1, 4.0, 1.0]}, fixed: true}",
+            "world.layout.other={position: [1.0, -2.0, 0.5]}",
+        ]
         for name, y in (("left", 3.9), ("right", -3.9)):
             wall += [
                 f"world.objects.{name}={{source: {{box: [3.0, 0.1, 1.0]}}, fixed: true}}",
@@ -93,6 +100,25 @@ def test_a_wall_is_gone_around() -> None:
 def test_a_goal_that_is_closed_off_is_refused() -> None:
     with walled(gap=False) as env:
         assert outcome(env, 100)[0] is Outcome.NO_PATH
+
+
+@pytest.mark.slow
+def test_a_gap_that_nothing_is_steered_through_is_given_up() -> None:
+    with walled(gap=False) as env:
+        env.reset(seed=3)
+        policy = SkillPolicy(env)
+        policy.begin(np.array([0]))
+        policy.act(np.array([0]))
+        slit = 2 * policy.skill.base.router.limits.radius + 0.05
+    with walled(gap=False, slit=slit) as env:
+        env.reset(seed=3)
+        policy, one = SkillPolicy(env), np.array([0])
+        policy.begin(one)
+        for _ in range(1200):
+            env.step(policy.act(one))
+            if policy.skill.base.no_way[0]:
+                break
+        assert policy.skill.base.router.refused == {0: "the base does not get on along any way that it has tried"}
 
 
 def test_a_planner_that_is_not_installed_is_named() -> None:
