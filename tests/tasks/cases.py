@@ -461,7 +461,9 @@ CASES: dict[str, Case] = {
     "hang_towel": Case(garment.let_go(garment.between(garment.over_rail)), [garment.shift(y=0.1), garment.take_hold]),
     "spread_towel": Case(garment.let_go(garment.between(garment.spread)), [garment.crumple(0.8), garment.take_hold]),
     "fold_towel": Case(garment.let_go(garment.between(garment.folded)), [garment.turn_up, garment.take_hold]),
-    "flatten_towel": Case(garment.let_go(garment.between(garment.spread)), [garment.crumple(0.8), garment.take_hold]),
+    "flatten_towel": Case(
+        garment.let_go(garment.between(garment.spread, garment.folded)), [garment.crumple(0.8), garment.take_hold]
+    ),
     "fold_shirt": Case(garment.let_go(garment.between(garment.shirt_folded)), [garment.lay_flat, garment.take_hold]),
     "pour_water": Case(_POURED, [lambda env: matter.spill(env, "water", 0.3)]),
     "plug_charger": _plugged(0.036),

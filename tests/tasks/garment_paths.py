@@ -29,12 +29,14 @@ def put_towel(env: TaskEnv, places: Array) -> None:
     env.scene.moment += 1
 
 
-def between(goal: Callable[[TaskEnv], Array]) -> Callable[[TaskEnv, float], None]:
-    """Each point of the towel from where it began to where it is in a goal, in a straight line."""
+def between(
+    goal: Callable[[TaskEnv], Array], start: Callable[[TaskEnv], Array] | None = None
+) -> Callable[[TaskEnv, float], None]:
+    """Each point of the towel from where it is at the start, or began, to where it is in a goal, in a straight line."""
 
     def path(env: TaskEnv, share: float) -> None:
         if share == 0.0:
-            _BEGUN[id(env)] = towel(env).x.copy()
+            _BEGUN[id(env)] = towel(env).x.copy() if start is None else start(env)
         first = _BEGUN[id(env)]
         put_towel(env, first + share * (goal(env) - first))
 
