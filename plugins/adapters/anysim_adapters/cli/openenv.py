@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from anysim.cli.options import Engine, Overrides
-from anysim_adapters.cli.listening import run, settings_of
+from anysim_serving.cli.listening import run, settings_of
 
 PORT = 8472
 
@@ -39,4 +39,4 @@ def openenv(
     settings = settings_of(host, port, no_token, tls_certificate, tls_key, Limits(sessions=max_sessions))
     service = openenv_service(task, settings, engine=engine, overrides=tuple(override or ()))
 
-    run(service, f"serving {task} to clients of OpenEnv")
+    run(service, f"serving {task} to clients of OpenEnv at {service.address}")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from anysim.cli.options import Engine, Overrides
-from anysim_adapters.cli.listening import run, settings_of
+from anysim_serving.cli.listening import run, settings_of
 
 PORT = 8000
 
@@ -49,4 +49,5 @@ def openpi(
     with PolicyHost(
         task, policy, clients=max_clients, engine=engine, overrides=tuple(override or ()), keys=keys
     ) as served:
-        run(policy_service(served, settings), f"serving the policy {policy} of {task} to clients of openpi")
+        service = policy_service(served, settings)
+        run(service, f"serving the policy {policy} of {task} to clients of openpi at {service.address}")

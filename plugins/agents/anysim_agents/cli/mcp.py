@@ -1,6 +1,5 @@
 """`anysim mcp`: tools for agents, over the Model Context Protocol."""
 
-import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -68,7 +67,6 @@ def mcp(
     from anysim_agents import mcp_server
     from anysim_agents.limits import SERVICE
     from anysim_serving.catalogue import Catalogue
-    from anysim_serving.settings import Settings
 
     mcp_server.sdk()
     total = max(SERVICE.total_envs, max_envs)
@@ -89,20 +87,15 @@ def mcp(
         asyncio.run(mcp_server.serve_stdio(Workspace(catalogue, shared=False)))
         return
 
-    from anysim_client.token import TOKEN_ENV
-    from anysim_serving.cli.serve import run
-    from anysim_serving.server import Service, fresh_token
+    from anysim_serving.cli.listening import run, settings_of
+    from anysim_serving.server import Service
 
-    given = os.environ.get(TOKEN_ENV)
-    token = "" if no_token else given or fresh_token()
-    settings = Settings(
-        host, port, token, tuple(allow_host or ()), tuple(allow_origin or ()), tls_certificate, tls_key, limits
-    )
+    settings = settings_of(host, port, no_token, tls_certificate, tls_key, limits, allow_host, allow_origin)
     service = Service(catalogue, settings, mcp_server.http_application())
     address = f"{service.address}{mcp_server.HTTP_PATH}"
     run(
         service,
         f"tools for agents at {address}",
         "clients send `Authorization: Bearer TOKEN`; Ctrl-C ends it",
-        bool(given),
+        keep=True,
     )

@@ -1,15 +1,12 @@
 """`anysim serve`: envs of tasks and worlds for other processes and machines."""
 
-import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from anysim.cli.options import Engine, NumEnvs, Overrides
-
-if TYPE_CHECKING:
-    from anysim_serving.server import Service
+from anysim_serving.cli.listening import run, settings_of
 
 PORT = 8470
 
@@ -55,51 +52,18 @@ def serve(
     """
     import logging
 
-    from anysim_client.token import TOKEN_ENV
     from anysim_serving.catalogue import Catalogue
-    from anysim_serving.server import Service, fresh_token
-    from anysim_serving.settings import Limits, Settings
+    from anysim_serving.server import Service
+    from anysim_serving.settings import Limits
 
     logging.basicConfig(format="%(levelname)s %(name)s: %(message)s", level=logging.WARNING)
-    given = os.environ.get(TOKEN_ENV)
-    token = "" if no_token else given or fresh_token()
     limits = Limits(
         sessions=max_sessions, envs=max_envs, total_envs=max_total_envs, idle_s=idle, linger_s=min(linger, idle)
     )
-    settings = Settings(
-        host, port, token, tuple(allow_host or ()), tuple(allow_origin or ()), tls_certificate, tls_key, limits
-    )
+    settings = settings_of(host, port, no_token, tls_certificate, tls_key, limits, allow_host, allow_origin)
     catalogue = Catalogue.of(
         sources, all_tasks=all_tasks, num_envs=num_envs, engine=engine, overrides=tuple(override or ()), limits=limits
     )
     service = Service(catalogue, settings)
     use = f'use it: env = anysim.connect("{service.address}"); Ctrl-C ends it'
-    run(service, f"serving {', '.join(catalogue.names())} at {service.address}", use, bool(given))
-
-
-def run(service: "Service", what: str, use: str, token_given: bool) -> None:
-    """Run a service until it is told to stop; say what it is, its token and how to use it."""
-    from anysim_client.token import TOKEN_ENV, forget_token, keep_token
-
-    settings = service.settings
-    kept = keep_token(service.address, settings.token) if settings.token else None
-
-    def told() -> None:
-        typer.echo(what)
-        if kept is None:
-            typer.echo(
-                "warning: there is no token: every process and user of this machine can use the service", err=True
-            )
-        else:
-            typer.echo(f"token: {'that of ' + TOKEN_ENV if token_given else settings.token}")
-            typer.echo(f"kept for your own clients on this machine in {kept}")
-        if not settings.on_loopback and settings.certificate is None:
-            typer.echo("warning: without TLS the token and all data can be read on the network between", err=True)
-        typer.echo(use)
-
-    try:
-        service.run(told)
-    finally:
-        if kept is not None:
-            forget_token(kept, settings.token)
-    typer.echo("ended: all envs are freed")
+    run(service, f"serving {', '.join(catalogue.names())} at {service.address}", use, keep=True)
