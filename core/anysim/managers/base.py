@@ -91,6 +91,7 @@ class Episodes:
 
     Attributes:
         origin: (N, 3) [m] where an env's scene stands on the ground; the terrain manager writes it.
+        bases: (N, 7) by robot, where a reset has put its base, if not where the World has it.
         elapsed: (N,) control steps since an env's reset; the env's loop writes it, and what follows.
         code: (N,) int8 the place of an env's word among those of `Status`: 0 while it runs, -1 before its first reset.
         succeeded: (N,) bool what was judged at an env's last step.
@@ -98,6 +99,7 @@ class Episodes:
 
     def __init__(self, num_envs: int) -> None:
         self.origin = np.zeros((num_envs, 3))
+        self.bases: dict[str, Array] = {}
         self.elapsed = np.zeros(num_envs, dtype=np.int64)
         self.code = np.full(num_envs, -1, dtype=np.int8)
         self.succeeded = np.zeros(num_envs, dtype=bool)

@@ -22,7 +22,6 @@ from anysim.placement.nominal import nominal_place, roots_at
 from anysim.placement.order import entry_of, placement_order
 from anysim.placement.sampler import EpisodeSampler, NominalSampler, PlacementSampler
 from anysim.placement.search import NoPlace, RefusedProposal, Search, is_constant
-from anysim.randomization.draw import is_random
 from anysim_schemas.layout import PlaceFields, RepairSpec
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -65,9 +64,6 @@ class LayoutManager(Manager):
             for item in self._others
             for entity in item.entities
         }
-        robots = content.robots.items()
-        drawn_robots = {name for name, robot in robots if is_random(robot.position) or is_random(robot.yaw)}
-        self._drawn_robots = {k for k, entity in enumerate(world.entities) if entity.name in drawn_robots}
         self._columns()
 
     def _solid(self, entity: int) -> Solid:
@@ -172,10 +168,9 @@ class LayoutManager(Manager):
 
     def _shifted(self, env: int, entity: int, origin: Sequence[float]) -> SettledObject:
         """What has no entry: where it is initially, from the origin of the env; a robot where it has just been put."""
-        still, root = self._still[entity], self._world.entities[entity].root
-        if entity in self._drawn_robots:
-            row = self.engine.get_state().body_pose[env, root]
-            return still._replace(placed=self._solid(entity).at(pose_of(row)))
+        still, put = self._still[entity], self.episodes.bases.get(self._world.entities[entity].name)
+        if put is not None:
+            return still._replace(placed=self._solid(entity).at(pose_of(put[env])))
         if not any(origin):
             return still
         pose = still.placed.pose

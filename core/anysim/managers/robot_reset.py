@@ -75,6 +75,7 @@ class RobotResetManager(Manager):
         """Put a robot's base where this episode wants it: as drawn, on the ground of its env."""
         origin = self.episodes.origin[env_ids]
         if not (is_random(spec.position) or is_random(spec.yaw) or origin.any()):
+            self.episodes.bases.pop(robot, None)
             return  # the World has it there
         path = f"world.robots.{robot}"
         place = draw_rows(spec.position, f"robot/{robot}/position", self.streams, env_ids, source=f"{path}.position")
@@ -82,10 +83,11 @@ class RobotResetManager(Manager):
         turn = P.from_roll_pitch_yaw(np.stack([np.zeros_like(yaw), np.zeros_like(yaw), yaw], axis=1))
         entry = self.engine.index.robot(robot).entry
         place[:, 2] += 0.0 if entry is None else entry.base_height
-        pose = np.concatenate([place + origin, turn], axis=1)[:, None]
+        pose = np.concatenate([place + origin, turn], axis=1)
+        self.episodes.bases.setdefault(robot, np.zeros((self.engine.num_envs, 7)))[env_ids] = pose
         root = self.engine.index.entity(robot).root
         free = self._world.bodies[root].kind is BodyKind.FREE
-        self.engine.set_body_state(pose, np.zeros((len(env_ids), 1, 6)) if free else None, env_ids, [root])
+        self.engine.set_body_state(pose[:, None], np.zeros((len(env_ids), 1, 6)) if free else None, env_ids, [root])
 
     def _draw_start(
         self, robot: str, spec: RobotSpec, joint: int, position: Array, velocity: Array, env_ids: Array
