@@ -18,6 +18,8 @@ from generated import ROOT, main
 from anysim_mujoco.mjcf import coverage as mjcf
 from anysim_urdf import coverage as urdf, sdf_coverage as sdf
 
+ENGINES = ("mujoco", "pybullet", "sapien")
+
 
 def table(rows: Iterable[tuple[str, str, str, str]]) -> str:
     """Rows of elements, their attributes, what becomes of them and how, as a table; empty attributes: all of them."""
@@ -46,7 +48,7 @@ def contacts() -> str:
     """The same files as whole scenes in contact: largest differences of each engine from MuJoCo itself."""
     lines = ["| file | of | steps in contact | MuJoCo | PyBullet | SAPIEN | left out |", "|---" * 7 + "|"]
     for row in json.loads((ROOT / "docs/model_contacts.json").read_text("utf-8")):
-        others = [_figure(row["others"].get(engine)) for engine in ("pybullet", "sapien")]
+        others = [_figure(row["others"].get(engine)) for engine in ENGINES[1:]]
         out = "; ".join(f"`{tree}`" if tree else why for tree, why in row["refused"].items())
         figures = " | ".join([str(row["touching"]), _figure(row["mujoco"]), *others])
         lines.append(f"| `{row['model']}` | {row['source']} | {figures} | {out} |")
@@ -58,9 +60,6 @@ def _figure(value: float | str | None) -> str:
     if isinstance(value, str):
         return "refused: " + value.partition(". Choose another engine")[0].partition("cannot run 'world': ")[2]
     return "" if value is None else f"{value:.0e}"
-
-
-ENGINES = ("mujoco", "pybullet", "sapien")
 
 
 def drafts() -> str:

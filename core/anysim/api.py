@@ -135,10 +135,12 @@ def _asset_folders(loaded: LoadedRun) -> dict[str, Path]:
     keys = {GROUND: "world.terrain.file"}
     for name, thing in loaded.spec.world.objects.items():
         keys[name] = f"world.objects.{name}.source.{_written(thing.source)}"
-    others = [files[path] for path in [_file_of(loaded, "world.source"), *list(files)[::-1]] if path in files]
-    for name, key in keys.items():  # what a scene file says is relative to the file that names it
-        if found := [files[place]] if (place := _file_of(loaded, key)) in files else others[:1]:
-            folders[name] = found[0]
+    last = loaded.files[-1].parent if loaded.files else None
+    scene = files.get(_file_of(loaded, "world.source"), last)  # what it says is relative to the file that names it
+    for name, key in keys.items():
+        folder = files.get(_file_of(loaded, key), scene)
+        if folder is not None:
+            folders[name] = folder
     return folders
 
 

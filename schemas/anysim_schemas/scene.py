@@ -1,9 +1,7 @@
 """Scene files beneath a world: what another program's file says, entry by entry, under what the YAML says itself."""
 
-import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import atan2, hypot
 from typing import Any, Literal, NamedTuple
 
 from pydantic import Field, ValidationError
@@ -62,11 +60,10 @@ def with_scene(root: Node, read: SceneReader | None, shapes: Shapes, faults: lis
     """The data on top of what its scene file says; as it is without one, or where that has been read before."""
     world = root.child("world")
     source = None if world is None else world.child("source")
-    given = None if source is None else source.plain()
     if read is None or source is None:
         return root
     try:
-        spec = SceneSpec.model_validate(given)
+        spec = SceneSpec.model_validate(source.plain())
     except ValidationError:
         return root  # the spec of the run says so
     if spec.notes is not None:
@@ -96,41 +93,3 @@ def _with(node: Node, keys: tuple[str, ...], value: Node, mark: Mark) -> Node:
     own = below.get(keys[0]) or Node({}, mark)
     made = value if len(keys) == 1 else _with(own, keys[1:], value, mark)
     return replace(node, value={**below, keys[0]: made.under(own.key or mark)})
-
-
-# ------------------------------------------------------------------ what readers share
-
-
-def free_name(wanted: str, otherwise: str, taken: Collection[str]) -> str:
-    """A name that anysim takes, made of one of another program, that is not taken; `otherwise` is for one without."""
-    name = re.sub(r"[^a-zA-Z0-9_]", "_", wanted.replace("::", "_"))
-    name = name if re.match(r"[a-zA-Z]", name) else f"{otherwise}_{name}" if name else otherwise
-    free, count = name, 0
-    while free in taken:
-        count += 1
-        free = f"{name}_{count}"
-    return free
-
-
-def control_step(dt: float, usual: float = 0.02) -> float:
-    """The whole multiple of a time step [s] that is nearest to the usual time between two actions [s]."""
-    steps = max(1, round(usual / dt)) if dt > 0 else 1
-    return usual if abs(steps * dt - usual) < 1e-9 else steps * dt
-
-
-def placed(position: Iterable[float], quaternion: Iterable[float]) -> dict[str, Any]:
-    """An entry of the layout for a position [m] and a unit quaternion xyzw, that other things may touch at first."""
-    angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(quaternion), strict=True))
-    turned = {key: angle for key, angle in angles.items() if angle}
-    return {"position": [float(v) for v in position], **turned, "checked": False}
-
-
-def roll_pitch_yaw(quaternion: Iterable[float]) -> list[float]:
-    """Angles [rad] of a unit quaternion xyzw, exact to rounding; the roll is 0 where the pitch is a right angle."""
-    x, y, z, w = (float(v) for v in quaternion)
-    ahead = (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y))
-    level = hypot(ahead[0], ahead[1])
-    pitch = atan2(-ahead[2], level)
-    if level < 1e-9:
-        return [0.0, pitch, atan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z))]
-    return [atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y)), pitch, atan2(ahead[1], ahead[0])]

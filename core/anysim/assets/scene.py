@@ -4,13 +4,16 @@ A reader is a function `(path, *, root, uri, packages)` to an `anysim_schemas.sc
 are `URI#/BODY`, which the importer of the format reads as a part of the scene, their layout, lights, cameras, physics.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from anysim import registry
 from anysim.assets.load import model_file
 from anysim.assets.uri import locate_folder
 from anysim.errors import AssetError
+from anysim.math import pose as P
 from anysim_schemas.nodes import Mark
 from anysim_schemas.scene import ImportedScene
 
@@ -41,3 +44,30 @@ def read_scene(uri: str, packages: Mapping[str, str], place: Mark) -> ImportedSc
         if entry.keys[:2] == ("world", "objects") and len(entry.keys) == 3:
             entry.value["source"]["packages"] = dict(packages)
     return scene
+
+
+# ------------------------------------------------------------------ what readers share
+
+
+def free_name(wanted: str, otherwise: str, taken: Collection[str]) -> str:
+    """A name that anysim takes, made of one of another program, that is not taken; `otherwise` is for one without."""
+    name = re.sub(r"[^a-zA-Z0-9_]", "_", wanted.replace("::", "_"))
+    name = name if re.match(r"[a-zA-Z]", name) else f"{otherwise}_{name}" if name else otherwise
+    free, count = name, 0
+    while free in taken:
+        count += 1
+        free = f"{name}_{count}"
+    return free
+
+
+def control_step(dt: float, usual: float = 0.02) -> float:
+    """The whole multiple of a time step [s] that is nearest to the usual time between two actions [s]."""
+    steps = max(1, round(usual / dt)) if dt > 0 else 1
+    return usual if abs(steps * dt - usual) < 1e-9 else steps * dt
+
+
+def placed(position: Iterable[float], quaternion: Iterable[float]) -> dict[str, Any]:
+    """An entry of the layout for a position [m] and a unit quaternion xyzw, that other things may touch at first."""
+    angles = dict(zip(("roll", "pitch", "yaw"), P.exact_roll_pitch_yaw(quaternion).tolist(), strict=True))
+    turned = {key: angle for key, angle in angles.items() if angle}
+    return {"position": [float(v) for v in position], **turned, "checked": False}

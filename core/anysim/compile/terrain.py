@@ -1,7 +1,6 @@
 """Compilation of the ground of a spec. Generated ground comes from a builder of the kind `terrains`."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -110,8 +109,7 @@ def _add_field(
 
 def _add(builder: WorldBuilder, spec: TerrainSpec, shape: Shape, issues: Issues, position: Vec3 = ORIGIN) -> None:
     softness = FIELD_SOFTNESS if isinstance(shape, HeightFieldShape) else 0.0
-    touch = Surface(friction=spec.friction, restitution=spec.restitution, softness=softness)
-    if spec.margin:
-        touch = replace(touch, compliance=Compliance(margin=spec.margin))
+    gives_way = Compliance(margin=spec.margin) if spec.margin else None
+    touch = Surface(friction=spec.friction, restitution=spec.restitution, softness=softness, compliance=gives_way)
     color = (*nominal_rgb(spec.color, _GREY, issues), 1.0)
     builder.geoms.append(Geom(GROUND, WORLD, shape, position, color=color, surface=touch))

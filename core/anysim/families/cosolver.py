@@ -55,6 +55,11 @@ class Balance(NamedTuple):
     given: Array
 
 
+def about_origin(parts: Array, at: Array) -> Array:
+    """(6,) the sum of parts (V, 3) of a momentum or a force at points (V, 3) [m], about the world's origin."""
+    return np.concatenate([parts.sum(axis=0), P.cross(at, parts).sum(axis=0)])
+
+
 class CoSolver(Family):
     """A family with a solver; its matter is in `memory`, as all that a family knows.
 

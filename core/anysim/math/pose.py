@@ -4,11 +4,13 @@ Everything is written component by component: numpy rounds elementwise operation
 same bits whatever the batch around it (a matrix product through BLAS or einsum would not promise that).
 """
 
+from collections.abc import Iterable
 from typing import TypeVar
 
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.math import matrix as M
 
 Angle = TypeVar("Angle", float, Array)
 
@@ -182,6 +184,28 @@ def to_roll_pitch_yaw(q: Array) -> Array:
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = np.arcsin(np.minimum(np.maximum(2.0 * (w * y - z * x), -1.0), 1.0))
     return np.stack([roll, pitch, yaw(q)], axis=-1)
+
+
+def exact_roll_pitch_yaw(q: Iterable[float]) -> Array:
+    """Roll, pitch and yaw (3,) of one unit quaternion, to rounding also where the pitch is a right angle.
+
+    Each angle is taken of what the others leave: an error of one is made good by the next.
+    """
+    left = to_matrix(np.array(tuple(q)))
+    flat = float(np.hypot(left[0, 0], left[1, 0]))
+    yaw = float(np.arctan2(left[1, 0], left[0, 0])) if flat > 1e-9 else 0.0
+    left = M.product(_about(2, -yaw), left)
+    pitch = float(np.arctan2(-left[2, 0], left[0, 0]))
+    left = M.product(_about(1, -pitch), left)
+    return np.array([float(np.arctan2(left[2, 1], left[1, 1])), pitch, yaw])
+
+
+def _about(axis: int, angle: float) -> Array:
+    turn = np.eye(3)
+    one, other = (axis + 1) % 3, (axis + 2) % 3
+    turn[one, one] = turn[other, other] = np.cos(angle)
+    turn[other, one], turn[one, other] = np.sin(angle), -np.sin(angle)
+    return turn
 
 
 def yaw(q: Array) -> Array:

@@ -29,7 +29,7 @@ from anysim_export_model.common import check_joint, free, is_ordinary, looks, ne
 from anysim_export_model.mesh_files import MeshFiles
 from anysim_export_model.notes import Notes
 from anysim_export_model.scene import Piece
-from anysim_export_model.xml import document, named, number, numbers, roll_pitch_yaw, sub
+from anysim_export_model.xml import document, named, number, numbers, sub
 
 
 def urdf(piece: Piece, meshes: MeshFiles, notes: Notes) -> bytes:
@@ -111,7 +111,7 @@ class _Urdf:
                 return
             element = sub(link, tag, name=geom.name)
             at = np.array(geom.position) - shift
-            sub(element, "origin", xyz=numbers(at), rpy=numbers(roll_pitch_yaw(geom.quaternion)))
+            sub(element, "origin", xyz=numbers(at), rpy=numbers(P.exact_roll_pitch_yaw(geom.quaternion)))
             self._shape(sub(element, "geometry"), geom)
             if tag == "visual":
                 material = sub(element, "material", name=" ".join(f"{v:g}" for v in geom.color))
@@ -141,7 +141,7 @@ class _Urdf:
         self._ends(joint, parent, child, pose)
 
     def _ends(self, joint: Any, parent: str, child: str, pose: Array) -> None:
-        sub(joint, "origin", xyz=numbers(pose[:3]), rpy=numbers(roll_pitch_yaw(pose[3:])))
+        sub(joint, "origin", xyz=numbers(pose[:3]), rpy=numbers(P.exact_roll_pitch_yaw(pose[3:])))
         sub(joint, "parent", link=parent)
         sub(joint, "child", link=child)
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, Phase, PhasedSkill
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
@@ -104,7 +104,7 @@ class _Flatness(PhasedSkill):
     def _look(self, ids: Array, at: Array) -> Array:
         share = covered(self._cloth.state().points[at], self._cloth.faces) / self._cloth.area
         said = np.where(share >= self._share, GO_ON, _ADVERSE)
-        return np.where(self.steps[ids] >= SETTLING, said, 0)
+        return np.where(self.steps[ids] >= SETTLING, said, STAY)
 
 
 _ADVERSE = OUTCOMES.index(Outcome.ADVERSE_STATE)

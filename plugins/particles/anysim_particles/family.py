@@ -13,7 +13,7 @@ from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
 from anysim.errors import SpecError, SpecIssue
 from anysim.families.base import FamilyPart, FamilySetting, FamilyState
-from anysim.families.cosolver import CoSolver, MetBodies
+from anysim.families.cosolver import CoSolver, MetBodies, about_origin
 from anysim.math import pose as P
 from anysim.model.appearance import rgb
 from anysim.model.world import Body, BodyKind
@@ -204,7 +204,7 @@ class Particles(CoSolver):
         """Tell families of other matter what their points (n, V, 3) [N s] got; it was not received from them."""
         for row, env in enumerate(env_ids.tolist()):
             got, points = impulse[row], tables[row].points
-            self.received[env] -= np.concatenate([got.sum(axis=0), P.cross(points, got).sum(axis=0)])
+            self.received[env] -= about_origin(got, points)
             begun = 0
             for other, count in zip(others, tables[row].counts, strict=True):
                 other.splash(env, got[begun : begun + count])
@@ -213,8 +213,7 @@ class Particles(CoSolver):
     def momentum(self, env_ids: Array) -> Array:
         mass, found = self.particle_mass(env_ids), np.zeros((len(env_ids), 6))
         for row, env in enumerate(env_ids.tolist()):
-            x, v = self.x[env, : self.count[env]], self.v[env, : self.count[env]]
-            found[row, :3], found[row, 3:] = v.sum(axis=0), P.cross(x, v).sum(axis=0)
+            found[row] = about_origin(self.v[env, : self.count[env]], self.x[env, : self.count[env]])
         return found * mass[:, None]
 
     # ------------------------------------------------------------------ what it looks like and means

@@ -103,13 +103,18 @@ class FemCloth(Soft):
             model.flex_bending[:] *= more
 
         sides = {side: on_side(points, size, side) for side in spec.attached}
-        return FlexSource(xml, fixed, mass, GRADIENTS if len(points) >= MANY else OPTIONS, sides, adjust)
+        return FlexSource(xml, fixed, mass, solver_of(len(points)), sides, adjust)
 
     def attached_sides(self) -> list[tuple[str, str]]:
         return [*self.cloth.attached.items()]
 
     def mass(self, env: int) -> float:
         return self.parameter("density", env) * self.parameter("thickness", env) * float(np.prod(self.cloth.size))
+
+
+def solver_of(count: int) -> Mapping[str, object]:
+    """MuJoCo's options for a sheet or a skin of so many points."""
+    return GRADIENTS if count >= MANY else OPTIONS
 
 
 def membrane(model: Any, young: float, poisson: float, thickness: float) -> Array:

@@ -13,10 +13,11 @@ import numpy as np
 from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.errors import PluginError
 from anysim.families.base import FamilySetting
+from anysim.families.cosolver import about_origin
 from anysim.math import pose as P
 from anysim_particles.skins import Skin, offer
-from anysim_soft.cloth import CHECKED, GRADIENTS, MANY, membrane
-from anysim_soft.deformable import OPTIONS, contact_of, numbers
+from anysim_soft.cloth import CHECKED, membrane, solver_of
+from anysim_soft.deformable import contact_of, numbers
 from anysim_soft.family import Soft
 from anysim_soft.spec import InflatableSpec, SoftSpec
 from anysim_soft.subworld import FlexSource, SubWorld
@@ -89,8 +90,6 @@ class Inflatable(Soft):
             f"{contact_of(values['friction'], self._step)}</flexcomp>"
         )
 
-        options = GRADIENTS if len(points) >= MANY else OPTIONS
-
         def adjust(model: mujoco.MjModel) -> None:
             model.flex_stiffness.reshape(-1, 21)[:, :6] = membrane(model, young, poisson, thickness)
 
@@ -106,7 +105,7 @@ class Inflatable(Soft):
             acts = self.pressure[env] - DAMPED * h / yields * swells
             return acts * slope + self.wet[env] / (h * self.soft.substeps)
 
-        return FlexSource(xml, np.zeros(len(points), dtype=bool), mass, options, {}, adjust, inner=press)
+        return FlexSource(xml, np.zeros(len(points), dtype=bool), mass, solver_of(len(points)), {}, adjust, inner=press)
 
     # ------------------------------------------------------------------ its life
 
@@ -164,11 +163,6 @@ class Inflatable(Soft):
 
     def recorded(self, env_ids: Array) -> Mapping[str, Array]:
         return {**super().recorded(env_ids), "pressure": self.pressure[env_ids]}
-
-
-def about_origin(impulse: Array, at: Array) -> Array:
-    """(6,) the sum of impulses (V, 3) [N s] at points (V, 3) [m], about the world's origin."""
-    return np.concatenate([impulse.sum(axis=0), P.cross(at, impulse).sum(axis=0)])
 
 
 def sphere(subdivisions: int) -> tuple[Array, Array]:

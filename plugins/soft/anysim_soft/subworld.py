@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
+from anysim.families.cosolver import about_origin
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_mujoco.geoms import add_assets, add_geom
@@ -219,7 +220,7 @@ class SubWorld:
     def momentum(self) -> Array:
         """(6,) of the flex, about the world's origin."""
         p = self.mass[:, None] * self.data.qvel[self._dofs]
-        return np.concatenate([p.sum(axis=0), P.cross(self.data.xpos[self._moving], p).sum(axis=0)])
+        return about_origin(p, self.data.xpos[self._moving])
 
     def meet(self, pose: Array, twist: Array, still: Array, there: Array, friction: Array) -> None:
         """Put the proxies to poses (K, 7) and twists (K, 6) of their frames, and what stands still to poses (S, 7).
@@ -312,13 +313,12 @@ class SubWorld:
         """What the flex got from all but the bodies that it meets."""
         if self._pinned:  # what holds it has no force of its own in MuJoCo: it gives what is missing
             change = self.momentum() - before
-            return change + _about_origin(got, centre)
+            return change + _wrenches_about_origin(got, centre)
         force = self.data.qfrc_constraint[self._dofs] + self.mass[:, None] * self.gravity + air
-        found = h * np.concatenate([force.sum(axis=0), P.cross(at, force).sum(axis=0)])
-        return found + _about_origin(got, centre)
+        return h * about_origin(force, at) + _wrenches_about_origin(got, centre)
 
 
-def _about_origin(impulse: Array, centre: Array) -> Array:
+def _wrenches_about_origin(impulse: Array, centre: Array) -> Array:
     """(6,) the sum of impulses (K, 6) about centres (K, 3), about the world's origin."""
     turned = impulse[:, 3:] + P.cross(centre, impulse[:, :3])
     return np.concatenate([impulse[:, :3].sum(axis=0), turned.sum(axis=0)])

@@ -13,12 +13,12 @@ import numpy as np
 
 from anysim.assets.bounded_files import check, xml_root
 from anysim.assets.model import ImportNote
-from anysim.assets.scene import PART
+from anysim.assets.scene import PART, control_step, free_name, placed
 from anysim.conventions import GROUND, Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
 from anysim_schemas.limits import SCENE_PARTS
-from anysim_schemas.scene import ImportedScene, SceneEntry, control_step, free_name, placed
+from anysim_schemas.scene import ImportedScene, SceneEntry
 from anysim_urdf.sdf import SdfModel
 from anysim_urdf.sdf_coverage import notes_of
 from anysim_urdf.sdf_file import SdfDocument, document
@@ -51,16 +51,16 @@ class _Scene:
     def read(self) -> ImportedScene:
         if self.world is not None:
             self._around(self.world)
-        ground = [name for name, element in self.file.models.items() if self._is_ground(name, element)]
+        ground = {name: element for name, element in self.file.models.items() if self._is_ground(name, element)}
         if ground:
-            first = self.file.models[ground[0]]
+            first = next(iter(ground.values()))
             self._put(("world", "terrain"), self._terrain(first), first)
         else:
             self._put(("world", "terrain"), {"kind": "none"}, self.world)
         check(self.path, SCENE_PARTS, sum(len(model.roots) for model in self.models.values()))
         taken: list[str] = [GROUND]
         for name, model in self.models.items():
-            for link in model.roots:
+            for link in model.roots if name not in ground else ():
                 self._object(name, model, link, taken)
         return ImportedScene(tuple(self.entries), tuple((n.kind, n.where, n.message) for n in self.notes))
 
@@ -174,10 +174,9 @@ class _Scene:
 
     def _object(self, name: str, model: SdfModel, link: str, taken: list[str]) -> None:
         element = self.file.models[name]
-        if self._is_ground(name, element) or not self._solid(model, link):
-            if not self._is_ground(name, element):
-                text = "has no shape, and is left out"
-                self.notes.append(ImportNote("dropped", f"link '{link}' of model '{name}'", text))
+        if not self._solid(model, link):
+            text = "has no shape, and is left out"
+            self.notes.append(ImportNote("dropped", f"link '{link}' of model '{name}'", text))
             return
         part = name if len(model.roots) == 1 else f"{name}::{link}"
         here = self._name(part, "model", taken)

@@ -47,9 +47,8 @@ def scene_part(spec: Any, path: Path, name: str) -> list[ImportNote]:
     if name:
         if name not in bodies:
             raise AssetError(f"{path}: there is no body '{name}'{suggest(name, list(bodies))} ({listing(bodies, 8)})")
-        for geom in (
-            one for one in spec.worldbody.geoms if one.meshname or one.hfieldname
-        ):  # tendons may refer to them
+        shaped = [geom for geom in spec.worldbody.geoms if geom.meshname or geom.hfieldname]
+        for geom in shaped:  # tendons may refer to them
             geom.type, geom.meshname, geom.hfieldname, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, "", "", [1e-3, 0, 0]
         if not bodies[name].name:
             bodies[name].name = f"body{name}"

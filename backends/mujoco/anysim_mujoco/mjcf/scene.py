@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from anysim.assets.bounded_files import check, xml_root
-from anysim.assets.scene import PART
+from anysim.assets.scene import PART, control_step, free_name, placed
 from anysim.conventions import GROUND, Array
 from anysim.errors import listing
 from anysim.math import pose as P
@@ -26,7 +26,7 @@ from anysim_mujoco.mjcf.geoms import pose_of
 from anysim_mujoco.mjcf.part import bodies_of, ground_of, owner_of
 from anysim_mujoco.mjcf.unheld import of_scene, value_of
 from anysim_schemas.limits import SCENE_PARTS
-from anysim_schemas.scene import ImportedScene, SceneEntry, SceneNote, control_step, free_name, placed, roll_pitch_yaw
+from anysim_schemas.scene import ImportedScene, SceneEntry, SceneNote
 
 SURROUNDINGS = "surroundings"
 """The name of the object that has all that is fixed to the world."""
@@ -92,6 +92,7 @@ class _Scene:
             mujoco.mj_resetDataKeyframe(self.model, self.data, home[0])
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
+        self.ground = ground_of(self.model)
         self._physics()
         self._ground()
         for part in [*([""] if self._has_fixed() else []), *self.bodies]:
@@ -136,7 +137,7 @@ class _Scene:
             self._put(("world", "name"), self.spec.modelname)
 
     def _ground(self) -> None:
-        number = ground_of(self.model)
+        number = self.ground
         if number < 0:
             self._put(("world", "terrain"), {"kind": "none"})
             return
@@ -157,8 +158,7 @@ class _Scene:
                 )
 
     def _has_fixed(self) -> bool:
-        ground = ground_of(self.model)
-        return bool(self.model.body_geomnum[0] > (ground >= 0) or np.any(self.model.site_bodyid == 0))
+        return bool(self.model.body_geomnum[0] > (self.ground >= 0) or np.any(self.model.site_bodyid == 0))
 
     # ------------------------------------------------------------------ objects
 
@@ -231,6 +231,7 @@ class _Scene:
 
     def _view(self, body: int, pose: Array, where: str) -> dict[str, Any]:
         """Where a camera is, and where it looks to: fixed to a body, or in the world."""
+        fixed = {"position": pose[:3].tolist(), "roll_pitch_yaw": P.exact_roll_pitch_yaw(pose[3:]).tolist()}
         if body:
             top = int(self.model.body_rootid[body])
             part = next(part for part, element in self.bodies.items() if element.id == top)
@@ -238,16 +239,12 @@ class _Scene:
             owner = self.names[part]
             own = self._owner(part)
             mount = owner if link == own and self._still(top) else f"{owner}.{link.removeprefix(f'{own}.')}"
-            return {"mount": mount, "position": pose[:3].tolist(), "roll_pitch_yaw": roll_pitch_yaw(pose[3:])}
+            return {"mount": mount, **fixed}
         ahead = P.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))
         target = pose[:3] + ahead
         if float(P.angle_between(P.look_at(pose[:3], target), pose[3:])) > 1e-6:
             if "" in self.names:
-                return {
-                    "mount": self.names[""],
-                    "position": pose[:3].tolist(),
-                    "roll_pitch_yaw": roll_pitch_yaw(pose[3:]),
-                }
+                return {"mount": self.names[""], **fixed}
             self._note("dropped", where, "is turned about its axis; here its images are upright")
         return {"from": pose[:3].tolist(), "look_at": target.tolist()}
 
@@ -271,7 +268,7 @@ class _Scene:
         number = {self.bodies[part].id: name for part, name in self.names.items() if part}
         for g in range(model.ngeom):
             top = int(model.body_rootid[model.geom_bodyid[g]])
-            name = GROUND if g == ground_of(model) else number.get(top, self.names.get("", ""))
+            name = GROUND if g == self.ground else number.get(top, self.names.get("", ""))
             own[name].append((int(model.geom_contype[g]), int(model.geom_conaffinity[g]), int(model.geom_bodyid[g])))
         barred = {tuple(sorted((int(s) >> 16, int(s) & 0xFFFF))) for s in model.exclude_signature}
         still = {name for name, value in self._fixed_ones() if value}

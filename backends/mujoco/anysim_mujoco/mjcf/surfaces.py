@@ -48,7 +48,7 @@ def contact_parameters(surface: Surface, dt: float) -> ContactParameters:
     """MuJoCo's contact parameters of a surface, for a time step `dt` [s]."""
     own = surface.compliance or Compliance()
     low, high = surface.impedance
-    solref, solmix = own.reference or (surface.softness or 0.02, 1.0), own.weight
+    solref, solmix = own.reference or (surface.softness or NATIVE_REFERENCE, 1.0), own.weight
     if surface.restitution > 0:
         ratio = damping_ratio(surface.restitution)
         solref, solmix = (dt / (BOUNCE_FREQUENCY * ratio), ratio), 10.0 ** (20 + 100 * surface.restitution)

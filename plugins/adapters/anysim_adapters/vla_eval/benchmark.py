@@ -5,7 +5,7 @@ from typing import Any
 from vla_eval.benchmarks.base import StepBenchmark, StepResult  # pyright: ignore[reportMissingImports]
 from vla_eval.specs import IMAGE_RGB, LANGUAGE, DimSpec  # pyright: ignore[reportMissingImports]
 
-from anysim_adapters.vla_eval_tasks import EvalTasks
+from anysim_adapters.vla_eval.tasks import EvalTasks
 
 
 class AnysimBenchmark(StepBenchmark):

@@ -1,1 +1,1 @@
-"""Spread a towel that lies folded."""
+"""Flatten a crumpled towel."""

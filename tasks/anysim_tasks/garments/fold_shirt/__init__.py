@@ -1,1 +1,1 @@
-"""Spread a towel that lies folded."""
+"""Fold the sleeves of a shirt in, and its hem to its shoulders."""
