@@ -35,6 +35,7 @@ FILE = """<mujoco><option timestep="0.001"/><worldbody><body name="base"><geom n
  <site site="eye"/><geom geom="drum" sidesite="side"/><site site="tip"/><pulley divisor="2"/><site site="tip"/>
  <site site="side"/></spatial></tendon></mujoco>"""
 GEOMS = "condim friction solref solimp margin gap solmix priority".split()
+TENDONS = "length0 lengthspring range stiffness damping frictionloss armature solref_lim solimp_lim margin".split()
 
 
 @pytest.fixture(scope="module")
@@ -98,9 +99,7 @@ def test_mujoco_has_what_the_file_has(file: Path, world: World, constraints: str
     np.testing.assert_allclose(sorted(own.eq_solimp.tolist()), sorted(raw.eq_solimp.tolist()))
     welds = [m.eq_data[m.eq_type == int(mujoco.mjtEq.mjEQ_WELD), 10].tolist() for m in (own, raw)]
     assert welds == [[0.3], [0.3]]
-    for (
-        field
-    ) in "length0 lengthspring range stiffness damping frictionloss armature solref_lim solimp_lim margin".split():
+    for field in TENDONS:
         np.testing.assert_allclose(
             getattr(own, f"tendon_{field}")[0], getattr(raw, f"tendon_{field}")[0], err_msg=field
         )

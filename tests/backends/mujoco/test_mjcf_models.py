@@ -1,7 +1,5 @@
 """Models of gymnasium against MuJoCo on the same files, with what docs/models.json is made of."""
 
-import importlib.util
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -10,29 +8,19 @@ from typing import Any
 import pytest
 
 from anysim.model.world import World
+from tests.backends.mujoco.programs import gymnasium_files, program
 
-ROOT = Path(__file__).parents[3]
 pytestmark = pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass'")  # of MuJoCo on the cheetah's file
 
 
 @pytest.fixture(scope="module")
 def models() -> ModuleType:
-    """`benchmarks/models.py`, which is no package."""
-    spec = importlib.util.spec_from_file_location("benchmark_of_models", ROOT / "benchmarks/models.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return program("models")
 
 
 @pytest.fixture(scope="module")
 def folder() -> Path:
-    found = importlib.util.find_spec("gymnasium")
-    if found is None or found.origin is None:
-        pytest.skip("gymnasium, whose files these are, is not installed")
-    return Path(found.origin).parent / "envs/mujoco/assets"
+    return gymnasium_files()
 
 
 @pytest.mark.parametrize(

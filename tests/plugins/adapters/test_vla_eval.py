@@ -11,7 +11,7 @@ import pytest
 import anysim
 from anysim.errors import TaskError
 from anysim.testing.engines import require_engine
-from anysim_adapters.vla_eval_tasks import EvalTasks
+from anysim_adapters.vla_eval.tasks import EvalTasks
 from anysim_evaluation.driver import episode_seeds
 
 OVERRIDES = ["record.cameras=[]", "task.horizon=5"]
