@@ -289,10 +289,18 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
     if not all(np.isfinite(piece.vertices).all() for piece in pieces):
         raise AssetError(f"{path}: holds vertices that are not finite")
     unit, up = _declared(path, data)
-    unit = _UNITS[scene.units or "millimeter"] if kind == ".3mf" else unit
+    unit = _unit_of_3mf(path, scene.units or "millimeter") if kind == ".3mf" else unit
     turn = np.array(scale)[:, None] * (_upright(kind, up) if upright else np.eye(3)) * unit
     flip = M.determinant(turn) < 0
     return [_Piece(M.product(v, turn.T), f[:, ::-1] if flip else f, color) for v, f, color in pieces]
+
+
+def _unit_of_3mf(path: Path, unit: str) -> float:
+    """[m] of a unit; trimesh calls that of a file that names none "millimeters"."""
+    singular = unit.removesuffix("s")
+    if singular not in _UNITS:
+        raise AssetError(f"{path}: its unit is '{unit}'; the units of a .3mf are {', '.join(_UNITS)}")
+    return _UNITS[singular]
 
 
 def _upright(kind: str, up: str) -> Array:
