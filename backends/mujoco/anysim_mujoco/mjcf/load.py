@@ -13,6 +13,7 @@ Rules where the neutral model is narrower; each use is a note in the report:
 - Solver settings of contacts, limits, dry friction and ties are kept as their compliance where the file sets them.
 """
 
+from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from math import inf
@@ -224,9 +225,10 @@ class _MjcfImport:
 
     def _of_parts(self, geometry: GeomReader) -> Iterator[Geom]:
         """The geoms; those that collide, of bodies that are lumped of several, with the centre of mass of their own."""
+        parts = Counter(body for body, _ in self.frames.values())
         for geom, number in zip(geometry.geoms, geometry.numbers, strict=True):
             part = int(self.model.geom_bodyid[number])
-            if geom.collides and sum(body == geom.body for body, _ in self.frames.values()) > 1:
+            if geom.collides and parts[geom.body] > 1:
                 inner = pose_of(self.model.body_ipos[part], self.model.body_iquat[part], self.scale)
                 com = P.compose(self.frames[part][1], inner)[:3]
                 yield replace(geom, part_com=tidy(com))
