@@ -81,14 +81,18 @@ class Mover:
         self.choice.on_update(lambda _: page.ask(self._choose))
 
     def _choose(self) -> None:
-        self.chosen = self._things.get(str(self.choice.value))
+        self.chosen = None
         if self._gizmo is not None:
             self._gizmo.remove()
             self._gizmo = None
-        if self.chosen is None:
+        with self._lock:
+            self._latest = None  # a drag of what was chosen before
+        chosen = self._things.get(str(self.choice.value))
+        if chosen is None:
             return
         self._gizmo = self._page.server.scene.add_transform_controls("/gizmo", scale=0.15, depth_test=False)
         self._gizmo.on_update(lambda event: self._dragged(event.target))
+        self.chosen = chosen  # from here on drags are heard
 
     def _dragged(self, gizmo: Any) -> None:
         pose = np.concatenate([gizmo.position, np.asarray(gizmo.wxyz)[[1, 2, 3, 0]]])

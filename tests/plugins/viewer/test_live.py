@@ -99,6 +99,7 @@ def test_objects_are_moved_while_time_stands_still_and_goals_at_any_time(
     view, env = shown[0], shown[0].env
     ball, before = env.engine.index.body("ball"), env.engine.get_state().body_pose.copy()
     person.choose("what", "object ball")
+    person.until(lambda: view._mover.chosen is not None)
     person.drag((0.1, 0.2, 0.9))
     person.until(lambda: at(person, "-ball", [0.1, 0.2, 0.9]))
     after = env.engine.get_state().body_pose
