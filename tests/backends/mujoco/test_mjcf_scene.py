@@ -108,7 +108,7 @@ def test_what_the_masks_keep_apart_never_collides(world: World) -> None:
 def test_what_is_not_in_the_world_is_told(folder: Path) -> None:
     notes = compile_with_report(load(folder / "world.yaml").spec, base=folder).report
     told = {name: " ".join(map(str, found)) for name, found in notes.items()}
-    assert "sensors: are left out" in told["source"]
+    assert "a touch is left out: it is on no body that something can touch" in told["surroundings"]
     assert "'door/1': is called 'door_1'" in told["source"]
     assert "becomes a box of 8 m by 8 m" in told["surroundings"]
     assert "1 drives of its file are left out" in told["door_1"]

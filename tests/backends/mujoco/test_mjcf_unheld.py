@@ -72,7 +72,7 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
         ("asset", '<asset><texture name="t" builtin="flat" type="2d" width="4" height="4"/></asset>', "textures: are"),
         ("inner", '<camera name="eye"/>', "cameras: are left out: those of a world are its own (1: eye)"),
         ("inner", "<light/>", "lights: are left out"),
-        ("rest", '<sensor><jointpos name="s" joint="turn"/></sensor>', "sensors: are left out"),
+        ("rest", '<sensor><jointpos name="s" joint="turn"/></sensor>', "sensors: a jointpos is left out: the state"),
         ("rest", '<actuator><motor joint="turn" ctrlrange="-1 2"/></actuator>', "actuator ctrlrange: [-1, 2] is one-"),
         (
             "rest",

@@ -37,10 +37,10 @@ PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
 }
 """Of fields that are approximated, what is not read of an element; empty where all is. Others are noted elsewhere."""
 
-WHOLE = "texture skin camera light pair sensor numeric text tuple plugin".split()
-"""The elements that are left out with a note each; tendons and flexes have words of their own."""
+WHOLE = "texture skin camera light pair numeric text tuple plugin".split()
+"""The elements that are left out with a note each; tendons, flexes and sensors have words of their own."""
 
-OF_SCENE = tuple("option texture skin material camera light sensor pair key numeric text tuple plugin".split())
+OF_SCENE = tuple("option texture skin material camera light pair key numeric text tuple plugin".split())
 WORLD_OPTIONS = ("timestep", "gravity", "cone", "impratio")
 """What of a file's options the `physics` of a world of it has."""
 _EARLY = ("texture", "skin", "material", "camera", "light")

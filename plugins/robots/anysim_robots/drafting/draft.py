@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from anysim.assets.load import import_asset, split_body
 from anysim.assets.model import ImportedModel
+from anysim.assets.scene import free_name
 from anysim.errors import AssetError
 from anysim.model.world import ControlMode, Joint
 from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SETTLING, STANDING, Gains, gains
@@ -198,6 +199,7 @@ class Draft(NamedTuple):
             for leg in g.legs:
                 joints = ", ".join(map(_quoted, leg.joints))
                 lines.append(f"  {leg.name}: {{joints: [{joints}], foot: {_quoted(leg.foot)}}}")
+        lines += self._sensors()
         weighed = "false" if g.floating or g.anchored else "true"
         apart = () if self.srdf is None else self.srdf.apart
         if apart:
@@ -205,6 +207,18 @@ class Draft(NamedTuple):
             lines += ["self_collision_exclusions:", *(f"  - [{_quoted(a)}, {_quoted(b)}]" for a, b in apart)]
         lines += ["self_collision: false", f"gravity_compensation: {weighed}"]
         return lines
+
+    def _sensors(self) -> list[str]:
+        """Places for what the file has of sensors, each of a name that no frame has."""
+        lines, taken = [], {"tool", *self.model.frames}
+        for hint in self.model.sensors:
+            name = free_name(hint.name, hint.kind, ())
+            name = name if name not in taken else free_name(f"{name}_sensor", hint.kind, taken)
+            taken.add(name)
+            params = f", params: {json.dumps(dict(hint.params))}" if hint.params else ""
+            told = f"  # {', '.join(hint.sources)} of the file"
+            lines.append(f"  {name}: {{kind: {hint.kind}, link: {_quoted(hint.frame)}{params}}}{told}")
+        return ["sensors:", *lines] if lines else []
 
 
 def draft(
@@ -311,7 +325,8 @@ def _open(model: ImportedModel, found: Guess) -> list[str]:
         asked.append(f"effort limits: the source has none for {', '.join(unlimited[:6])}{'…' * (len(unlimited) > 6)}")
     if not any(geom.collides for geom in model.geoms):
         asked.append("collision shapes: the source has none; the robot passes through everything")
-    asked.append("sensors, surfaces and self_collision are not in the file")
+    rest = "surfaces and self_collision are not in the file"
+    asked.append(rest if model.sensors else f"sensors, {rest}")
     return asked
 
 
