@@ -14,7 +14,7 @@ from anysim.assets.model import ImportedModel
 from anysim.assets.scene import free_name
 from anysim.errors import AssetError
 from anysim.model.world import ControlMode, Joint
-from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SETTLING, STANDING, Gains, gains
+from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SAG, SETTLING, STANDING, Gains, gains
 from anysim_robots.drafting.guess import Guess, guess, home_of, within
 from anysim_robots.drafting.sources import source_of
 from anysim_robots.drafting.srdf import Srdf, beside, read
@@ -101,6 +101,8 @@ class Draft(NamedTuple):
         lines[-1] += (
             f"; legs: kp at least {STANDING:g} m times the weight, kd {SETTLING:g} s times kp." if legs else "."
         )
+        if not _compensated(g):
+            lines += [f"# No weight is compensated: kp is at least what bears it within {SAG:g} rad or m of home."]
         lines.append("channels:")
         for name, joints in channels.items():
             if not joints:
@@ -200,7 +202,7 @@ class Draft(NamedTuple):
                 joints = ", ".join(map(_quoted, leg.joints))
                 lines.append(f"  {leg.name}: {{joints: [{joints}], foot: {_quoted(leg.foot)}}}")
         lines += self._sensors()
-        weighed = "false" if g.floating or g.anchored else "true"
+        weighed = "true" if _compensated(g) else "false"
         apart = () if self.srdf is None else self.srdf.apart
         if apart:
             lines.append("# Pairs of the SRDF, for `self_collision: true`")
@@ -266,7 +268,7 @@ def draft(
         path,
         model,
         found,
-        gains(model, found.floating, legs),
+        gains(model, found.floating, legs, weighed=not _compensated(found)),
         tuple(_open(model, found)),
         notes,
         folders,
@@ -274,6 +276,11 @@ def draft(
         source.uri,
         srdf,
     )
+
+
+def _compensated(found: Guess) -> bool:
+    """Whether what a joint bears is compensated: of robots that are bolted down, or carried over the ground."""
+    return not (found.floating or found.anchored)
 
 
 def _home_pose(srdf: Srdf | None) -> str:
