@@ -29,8 +29,8 @@ _LAWS = "a motor, position or velocity drive of one hinge or slide becomes a dri
 FIELDS: Mapping[str, tuple[Row, ...]] = {
     "body": (
         Row(_EXACT, f"{_POSE} mass ipos iquat ialt inertia fullinertia explicitinertial"),
+        Row(_EXACT, "mocap", "it is fixed, and its pose a part of each env's state, which may be written at any time"),
         Row(_ABOUT, "gravcomp", "all of the weight, or none below a half"),
-        Row(_OUT, "mocap", "it stays where it is"),
         Row(_OUT, "userdata", _NUMBERS),
         Row(_OUT, "plugin", "it is MuJoCo's alone"),
         Row(_IDLE, "simple fuse sleep", "it is of how MuJoCo computes"),
@@ -118,7 +118,7 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_ABOUT, "qpos", "the one that is called `home`"),
         Row(_OUT, "qvel", "everything begins at rest"),
         Row(_OUT, "act ctrl", "commands are a task's"),
-        Row(_OUT, "mpos mquat", "what a mocap body is here stays where it is"),
+        Row(_ABOUT, "mpos mquat", "those of the one that is called `home`, in a scene; a world places an asset"),
         Row(_IDLE, "time", "an episode begins at 0"),
     ),
     "option": (
@@ -160,7 +160,7 @@ WHOLE: Mapping[str, Row] = {
     "skin bone": Row(_OUT, "", "bodies are drawn by their geoms"),
     "camera": Row(_OUT, "", _OWN),
     "light": Row(_OUT, "", _OWN),
-    "pair": Row(_OUT, "", "geoms meet by their masks, with the friction of both"),
+    "pair": Row(_ABOUT, "", "geoms meet by their masks, with what both have; the report names pairs that differ"),
     "numeric": Row(_OUT, "", _ALONE),
     "text": Row(_OUT, "", _ALONE),
     "tuple element": Row(_OUT, "", _ALONE),

@@ -39,7 +39,7 @@ from anysim_mujoco.mjcf.couplings import Couplings
 from anysim_mujoco.mjcf.drives import drive_hint, left_out, shared
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
-from anysim_mujoco.mjcf.pairs import PairReader
+from anysim_mujoco.mjcf.pairs import PairReader, of_pairs
 from anysim_mujoco.mjcf.part import unqualified
 from anysim_mujoco.mjcf.sensors import SensorReader, told_of
 from anysim_mujoco.mjcf.unheld import of_tendons
@@ -259,7 +259,7 @@ class _MjcfImport:
         parts = Counter(body for body, _ in self.frames.values())
         joined = frozenset(number for number, (body, _) in self.frames.items() if parts[body] > 1)
         hints, notes = SensorReader(self.model, self.site_names, self.links, joined, self.scale).read()
-        self.notes += [*notes, *([] if part else told_of(hints))]
+        self.notes += [*notes, *([] if part else [*told_of(hints), *of_pairs(self.model)])]
         return tuple(hints)
 
     # ------------------------------------------------------------------ joints

@@ -158,4 +158,5 @@ def keep(spec: Any, path: Path, body: str) -> list[ImportNote]:
 
 def _ties(spec: Any) -> Counter[str]:
     """How many elements there are that may tie one body to another."""
-    return Counter({"equalities": len(spec.equalities), "tendons": len(spec.tendons)})
+    kinds = {"equalities": spec.equalities, "tendons": spec.tendons, "pairs": spec.pairs}
+    return Counter({kind: len(elements) for kind, elements in kinds.items()})

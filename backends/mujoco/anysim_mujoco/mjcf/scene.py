@@ -25,6 +25,7 @@ from anysim.math import pose as P
 from anysim_mujoco.mjcf.file import compile_noting, opened
 from anysim_mujoco.mjcf.geoms import pose_of
 from anysim_mujoco.mjcf.load import import_mjcf
+from anysim_mujoco.mjcf.pairs import of_pairs
 from anysim_mujoco.mjcf.part import bodies_of, ground_of, owner_of
 from anysim_mujoco.mjcf.sensors import body_of, tag_of
 from anysim_mujoco.mjcf.unheld import of_scene, value_of
@@ -73,6 +74,7 @@ def read_mjcf_scene(path: Path, *, root: Path, uri: str, packages: Mapping[str, 
         check(path, SCENE_PARTS, len(bodies))
         notes += of_scene(spec)
         model = compile_noting(spec, notes)
+        notes += of_pairs(model)
         told: list[SceneNote] = [(n.kind, n.where, n.message) for n in notes]
         return _Scene(path, root, uri, spec, bodies, model, told).read()
 
