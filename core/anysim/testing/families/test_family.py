@@ -43,6 +43,9 @@ def test_state(make: Make) -> None:
     whole = env.families.state(NAME)
     np.testing.assert_array_equal(state.points, whole.points[[2, 0]], "rows are those of the envs asked for")
     assert all(rows.shape[:2] == (2, count) for rows in state.fields.values())
+    color = family_of(env).color
+    assert len(color) == 3
+    assert all(0.0 <= share <= 1.0 for share in color)
 
 
 def test_facts(make: Make) -> None:
