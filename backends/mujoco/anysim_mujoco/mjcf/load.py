@@ -108,6 +108,7 @@ class _MjcfImport:
             constraints=tuple(couplings.constraints()),
             spatial_tendons=tuple(couplings.spatial_tendons()),
             report=tuple(self.notes),
+            wholes=geometry.wholes,
         )
 
     # ------------------------------------------------------------------ the tree
