@@ -85,6 +85,14 @@ def test_3mf_has_a_unit_and_stays_within_its_package(folder: Path) -> None:
         meshes.collision_mesh(folder / "damaged.3mf")
 
 
+def test_triangles_of_vertices_that_are_not_there_are_refused(folder: Path) -> None:
+    data = write(folder / "box.glb", trimesh.creation.box((0.2, 0.4, 0.6))).read_bytes()
+    first = 28 + int.from_bytes(data[12:16], "little")  # of the indices, behind the JSON
+    (folder / "wrong.glb").write_bytes(data[:first] + (99).to_bytes(4, "little") + data[first + 4 :])
+    with pytest.raises(AssetError, match="a triangle has vertex 99 of"):
+        meshes.collision_mesh(folder / "wrong.glb")
+
+
 def test_buffers_of_a_gltf_lie_in_its_folder(folder: Path) -> None:
     inner = folder / "inner"
     inner.mkdir()

@@ -3,16 +3,19 @@
 `pytest tests/fuzz/test_wild.py -m full -s -k 7-` runs one chunk of a thousand; `Wild(folder).attempt(1234)` makes one.
 """
 
+import time
+from collections.abc import Iterator
+
 import pytest
 
-from tests.fuzz.budget import Tally
+from tests.fuzz.budget import SECONDS, Tally
 from tests.fuzz.wild import Wild
 
 COUNT, CHUNK, FEW = 20_000, 1000, 120
 
 
 @pytest.fixture(scope="module")
-def wild(tmp_path_factory: pytest.TempPathFactory) -> Wild:
+def wild(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Wild]:
     """The folder; its hook stays with the process and notes nothing where no input runs."""
     around = tmp_path_factory.mktemp("wild")
     with pytest.MonkeyPatch.context() as patch:
@@ -26,7 +29,13 @@ def run(wild: Wild, numbers: range) -> Tally:
     """The inputs of these numbers."""
     tally = Tally("model, scene and mesh files")
     for number in numbers:
+        faults, began = len(tally.faults), time.process_time()
         tally.run(f"wild {number}", wild.attempt(number))
+        slow = len(tally.faults) > faults and "took more than" in tally.faults[-1]
+        if slow and time.process_time() - began < SECONDS:  # it waited, perhaps for other processes: once more
+            tally.faults.pop()
+            tally.inputs -= 1
+            tally.run(f"wild {number}", wild.attempt(number))
     return tally
 
 

@@ -35,6 +35,7 @@ SCENE_MJCF = MJCF.replace("</worldbody>", _BALL)
 URDF_SDF_MJCF = {"urdf": URDF, "sdf": SDF, "xml": MJCF}
 SECRET, SECRET_SIZE = "xyzzy-the-word", 0.77731
 _ENDINGS = ("stl", "obj", "ply", "off", "glb", "gltf", "3mf", "dae")
+_THINGS = ("link.obj", "loop.obj", "pipe.obj", "folder.obj", "sparse.obj", "link.stl", "out.urdf", "tetra.obj/a.obj")
 _TRAPS = (
     "../../outside/secret.obj",
     "link.obj",
@@ -176,7 +177,7 @@ class Wild:
         else:
             shown["objects"]["it"]["source"] = f"{self.folder}/{file.name}"
         if rng.random() < 0.02:
-            shown = {"objects": {"it": {"source": f"{self.folder}/{self._trap(rng)}"}}}
+            shown = {"objects": {"it": {"source": f"{self.folder}/{pick(rng, _THINGS)}"}}}
         return {"world": shown}
 
     def _trap(self, rng: np.random.Generator) -> str:

@@ -257,7 +257,10 @@ def _files_beside(path: Path, data: bytes) -> list[Path]:
     except (ValueError, AttributeError, RecursionError) as error:
         raise AssetError(f"{path}: cannot be read as a mesh: {error}") from error
     here = path.parent.resolve()
-    files = [(here / unquote(name)).resolve() for name in asked if not name.startswith("data:")]
+    try:
+        files = [(here / unquote(name)).resolve() for name in asked if not name.startswith("data:")]
+    except (ValueError, RuntimeError, OSError) as error:  # no name of a file, or a loop of symbolic links
+        raise AssetError(f"{path}: a buffer cannot be found: {error}") from error
     for file in files:
         if not file.is_relative_to(here):
             raise AssetError(f"{path}: a buffer lies outside of its folder: {file}")
@@ -305,6 +308,8 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
             total += len(faces)
             check(path, MESH_FACES, total)  # a geometry may be there many times
             if len(faces):
+                if faces.min() < 0 or faces.max() >= len(geometry.vertices):
+                    raise ValueError(f"a triangle has vertex {faces.max()} of {len(geometry.vertices)}")
                 vertices = M.product(np.asarray(geometry.vertices, dtype=float), matrix[:3, :3].T) + matrix[:3, 3]
                 mirrored = M.determinant(matrix[:3, :3]) < 0
                 pieces.append(
