@@ -41,7 +41,11 @@ ROWS: tuple[Row, ...] = (
     Row("stage", _ABOUT, "timeSamples", "of what changes in time, the first value counts"),
     Row("stage", _IDLE, "defaultPrim startTimeCode endTimeCode timeCodesPerSecond framesPerSecond customLayerData"),
     Row("prim", _EXACT, "active instanceable purpose visibility", "what is for guidance or hidden is not drawn"),
-    Row("prim", _IDLE, "kind documentation customData assetInfo extent proxyPrim ui:*"),
+    Row("prim", _IDLE, "kind documentation customData assetInfo extent extentsHint proxyPrim"),
+    Row("prim", _IDLE, "ui:* model:* userProperties:*", "what tools keep for themselves"),
+    *(Row(kind, _IDLE) for kind in ("GeomModelAPI", "NodeGraphNodeAPI", "AssetPreviewsAPI")),
+    *(Row(kind, _OUT, "", "what things are is the world's to say") for kind in ("SemanticsAPI", "SemanticsLabelsAPI")),
+    Row("SemanticsAPI", _OUT, "semantic:* semantics:*", "what things are is the world's to say"),
     *(Row(kind, _IDLE) for kind in ("Xform", "Scope")),
     Row("Xformable", _EXACT, "xformOp:* xformOpOrder", "scale is of shapes, and of places within"),
     # ------------------------------------------------------------------ bodies and masses
@@ -80,6 +84,7 @@ ROWS: tuple[Row, ...] = (
     # ------------------------------------------------------------------ what touches
     Row("PhysicsCollisionAPI", _EXACT),
     Row("PhysicsCollisionAPI", _EXACT, "physics:collisionEnabled"),
+    Row("PhysicsCollisionAPI", _OUT, "physics:simulationOwner", "there is one scene"),
     Row("PhysicsMeshCollisionAPI", _EXACT),
     Row(
         "PhysicsMeshCollisionAPI",
@@ -199,7 +204,7 @@ ROWS: tuple[Row, ...] = (
         for kind in (
             "MjcSceneAPI", "MjcJointAPI", "MjcCollisionAPI", "MjcMaterialAPI", "MjcBodyAPI", "MjcImageableAPI",
             "MjcMeshCollisionAPI", "NewtonJointAPI", "NewtonMaterialAPI", "NewtonMimicAPI", "NewtonArticulationRootAPI",
-            "NewtonCollisionAPI", "NewtonSceneAPI", "NewtonMassAPI",
+            "NewtonCollisionAPI", "NewtonMeshCollisionAPI", "NewtonSceneAPI", "NewtonMassAPI",
         )
     ),  # fmt: skip
     *(Row(kind, _EXACT, "", "a frame") for kind in ("MjcSiteAPI", "NewtonSiteAPI")),
@@ -209,20 +214,24 @@ ROWS: tuple[Row, ...] = (
     Row("MjcJointAPI", _EXACT, "mjc:springref", "in degrees, where it turns"),
     Row("MjcJointAPI", _OUT, "mjc:*", _SOLVER),
     Row("MjcImageableAPI", _IDLE, "mjc:group"),
-    *(
-        Row(kind, _OUT, "", "drives are those of the catalogue's entry, or of PhysicsDriveAPI")
-        for kind in ("MjcActuator", "MjcPhysicsActuator")
-    ),
+    Row("MjcActuator", _ABOUT, "", "one with dynamics, or of what is no joint, is left out, with a note"),
+    Row("MjcActuator", _EXACT, "mjc:target mjc:gear mjc:gainPrm mjc:biasPrm mjc:gainType mjc:biasType mjc:dynType"),
+    Row("MjcActuator", _EXACT, "mjc:forceLimited mjc:forceRange:min mjc:forceRange:max"),
+    Row("MjcActuator", _ABOUT, "mjc:ctrlLimited mjc:ctrlRange:min mjc:ctrlRange:max", "of a motor, its effort limit"),
     *(Row(kind, _OUT, "", "it is MuJoCo's alone") for kind in ("MjcTendon", "MjcKeyframe", "MjcSensor")),
     *(
         Row(kind, _OUT, "", "ties of a file are left out")
-        for kind in ("MjcEqualityAPI", "MjcEqualityConnectAPI", "MjcEqualityWeldAPI", "MjcEqualityJointAPI")
+        for kind in ("MjcEqualityAPI", "MjcEqualityConnectAPI", "MjcEqualityWeldAPI")
     ),
+    Row("MjcEqualityJointAPI", _EXACT),
+    Row("MjcEqualityJointAPI", _EXACT, "mjc:coef0 mjc:coef1"),
+    Row("MjcEqualityJointAPI", _OUT, "mjc:coef2 mjc:coef3 mjc:coef4", "joints follow in proportion"),
     Row("NewtonJointAPI", _EXACT, "newton:armature newton:friction"),
+    Row("NewtonJointAPI", _EXACT, "newton:damping newton:velocityLimit", "in degrees, where it turns"),
     Row("NewtonMaterialAPI", _EXACT, "newton:torsionalFriction newton:rollingFriction"),
     Row("NewtonMimicAPI", _EXACT, "newton:mimicJoint newton:mimicCoef0 newton:mimicCoef1", "in degrees, where it turns"),
     Row("NewtonMimicAPI", _IDLE, "newton:mimicEnabled"),
-    Row("NewtonJointAPI", _OUT, "newton:*", "readers differ in its unit, or solvers are the engine's"),
+    Row("NewtonJointAPI", _OUT, "newton:*", _SOLVER),
     # ------------------------------------------------------------------ as anysim writes them
     Row("anysim", _EXACT, "anysim:*", "in double precision, where the file's own number rounds to the same"),
 )
@@ -233,7 +242,8 @@ JOINTS = frozenset(
 )
 _WHOLE: Mapping[str, Row] = {row.path: row for row in ROWS if not row.attributes}
 _NAMES = [(name, row) for row in ROWS for name in row.attributes.split() if row.path not in ("stage",)]
-_EXACTLY: Mapping[str, Row] = {name: row for name, row in reversed(_NAMES) if "*" not in name}
+_EXACTLY: Mapping[str, Row] = {n: row for n, row in reversed(_NAMES) if "*" not in n and row.path != "joint"}
+_OF_JOINTS: Mapping[str, Row] = {n: row for n, row in _NAMES if row.path == "joint"}
 _PATTERNS = sorted(
     ((re.compile(re.escape(name).replace(r"\*", ".+")), row) for name, row in _NAMES if "*" in name),
     key=lambda pair: -len(pair[0].pattern),
@@ -251,8 +261,10 @@ def schema(name: str) -> Row | None:
     return _WHOLE.get(name)
 
 
-def attribute(name: str) -> Row | None:
-    """What becomes of an attribute or a relationship, whatever prim it is on."""
+def attribute(name: str, kind: str = "") -> Row | None:
+    """What becomes of an attribute or a relationship of a prim of some type."""
+    if name in _OF_JOINTS and (kind.endswith("Joint") or name not in _EXACTLY):
+        return _OF_JOINTS[name]
     if name in _EXACTLY:
         return _EXACTLY[name]
     return next((row for pattern, row in _PATTERNS if pattern.fullmatch(name)), None)

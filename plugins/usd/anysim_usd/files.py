@@ -93,7 +93,7 @@ class _Layers:
         if not layer:
             raise AssetError(f"{asked}: cannot be read as USD: it is damaged, or of a version that usd-core does not know")
         self._layers[identifier] = layer
-        for reference in sorted(layer.GetCompositionAssetDependencies()):
+        for reference in filter(None, sorted(layer.GetCompositionAssetDependencies())):
             inner = self._resolved(layer, reference)
             if inner is not None:
                 self._targets[identifier, reference] = inner

@@ -9,12 +9,11 @@ from anysim.assets.model import ActuatorHint, ImportNote
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import ControlMode
-from anysim_usd.numbers import applied, authored, bound, exact, exact_vector, get, given, real
+from anysim_usd.numbers import DIRECTIONS, applied, authored, bound, directions, exact, exact_vector, get, given, real
 from anysim_usd.space import Space
 from anysim_usd.structure import Tie
 
-_DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
-_CALLED = dict(zip(_DIRECTIONS, ("x", "y", "z", "roll", "pitch", "yaw"), strict=True))
+_CALLED = dict(zip(DIRECTIONS, ("x", "y", "z", "roll", "pitch", "yaw"), strict=True))
 _AXES = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
 
 
@@ -42,8 +41,8 @@ class JointReader:
     def _note(self, kind: Any, tie: Tie, message: str) -> None:
         self._notes.append(ImportNote(kind, f"joint '{tie.name}'", message))
 
-    def motions(self, tie: Tie) -> list[Motion] | None:
-        """What moves, in the order of a chain; none of a fixed joint, None where it ties nothing."""
+    def motions(self, tie: Tie) -> list[Motion]:
+        """What moves, in the order of a chain; none of a fixed joint."""
         prim = tie.prim
         if tie.kind == "PhysicsFixedJoint":
             return []
@@ -53,14 +52,8 @@ class JointReader:
             cone = [given(prim, f"physics:coneAngle{i}Limit") for i in (0, 1)]
             text = "; its cone is left out" if any(c is not None and 0 <= c < 180 for c in cone) else ""
             self._note("info", tie, f"is spherical, and becomes a chain of hinges .roll, .pitch and .yaw{text}")
-            return [self._direction(tie, name, -inf, inf) for name in _DIRECTIONS[3:]]
-        found = []
-        for name in _DIRECTIONS:
-            low, high = (real(prim, f"limit:{name}:physics:{end}", way * inf) for end, way in (("low", -1), ("high", 1)))
-            if low <= high:
-                found.append(self._direction(tie, name, low, high))
-        if len(found) == len(_DIRECTIONS):
-            return None
+            return [self._direction(tie, name, -inf, inf) for name in DIRECTIONS[3:]]
+        found = [self._direction(tie, name, low, high) for name, low, high in directions(prim)]
         if len(found) > 1:
             names = ", ".join(f".{motion.suffix}" for motion in found)
             self._note("info", tie, f"moves in {len(found)} directions, and becomes a chain of joints {names}")
@@ -105,8 +98,11 @@ class JointReader:
             tie, motion, "physxJointAxis:*:armature", "physxJoint:armature", "mjc:armature", "newton:armature"
         )
         viscous = self._of(tie, motion, "physxJointAxis:*:viscousFrictionCoefficient")
+        viscous = given(prim, "newton:damping") if viscous is None else viscous
         damping = given(prim, "mjc:damping") if viscous is None else viscous * (degrees(1.0) if motion.turns else 1.0)
-        speed = self._first(tie, motion, "physxJointAxis:*:maxJointVelocity", "physxJoint:maxJointVelocity")
+        speed = self._first(
+            tie, motion, "physxJointAxis:*:maxJointVelocity", "physxJoint:maxJointVelocity", "newton:velocityLimit"
+        )
         effort = self._of(tie, motion, "drive:*:physics:maxForce")
         way = radians(1.0) if motion.turns else 1.0
         rough = {  # in units of the file, turns in radians

@@ -29,6 +29,7 @@ from anysim.kinematics.inertia import VIRTUAL_SHARE
 from anysim.math import pose as P
 from anysim.model.hash import split, tidy
 from anysim.model.world import FAR, Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
+from anysim_usd.actuators import actuators
 from anysim_usd.files import opened
 from anysim_usd.joints import JointReader, Motion, along, moved
 from anysim_usd.looks import LookReader
@@ -42,6 +43,10 @@ from anysim_usd.unheld import notes_of
 
 _APART = 1e-4
 """[m] and [rad] that places of bodies may differ from what their joint says before a note tells of it."""
+
+
+_LEADERS = {"newton:mimicJoint": "newton:mimicC", "mjc:target": "mjc:c"}
+"""Relations to a joint that is followed, and what the names of their coefficients begin with."""
 
 
 def import_usd(
@@ -104,6 +109,7 @@ class _UsdImport:
         self.links: dict[str, int] = {}
         self.hints: list[ActuatorHint] = []
         self.place: dict[str, tuple[int, Array]] = {}  # of each part its body, and where it is in that
+        self.carrier: dict[str, tuple[int, Array]] = {}  # of parts with several joints the last link before them
         self.number: dict[str, int] = {}  # of each joint of one direction, by its path
         self.ties: list[Tie] = []
         self.content: dict[str, list[Any]] = {}
@@ -118,10 +124,13 @@ class _UsdImport:
             name = tree.name
             self._root(tree)
             for part in tree.parts[1:]:
-                self._attach(part, tree.ties[part])
+                self._attach(part, self._after_another(part, tree.ties[part]))
         self._frames()
         self._follow()
         self._inertials()
+        numbers = {path: (number, self.joints[number].type is JointType.REVOLUTE) for path, number in self.number.items()}
+        taken = {hint.joint for hint in self.hints}
+        self.hints += actuators(self.structure, numbers, taken, self.space, self.notes)
         if tree is not None and self.alone and tree.root != BASE:
             self._beside()
         report = [*self.notes, *notes_of(self.structure, self._mine(), self.looks.materials, whole=self.alone)]
@@ -178,17 +187,49 @@ class _UsdImport:
     def _weightless(self, part: str) -> bool:
         return bool(get(self.structure.parts[part].prim, "physxRigidBody:disableGravity"))
 
+    def _after_another(self, part: str, tie: Tie) -> Tie:
+        """Put the links between a part and what carries it, of which it has several joints; the last of these is left.
+
+        The joints of MuJoCo's bodies turn about anchors of the body at its place at zero, one after another.
+        """
+        assert self.tree is not None
+        further = self.tree.further.get(part, [])
+        if not further:
+            return tie
+        body, frame = self.place[tie.ends[0]]
+        rest = P.compose(tie.frames[0], P.inverse(tie.frames[1]))
+        for other in further:
+            there = P.compose(other.frames[0], P.inverse(other.frames[1]))
+            gap = P.compose(P.inverse(rest), there)
+            if max(np.linalg.norm(gap[:3]), np.linalg.norm(P.rotation_vector(gap[3:]))) > 10 * _APART:
+                raise AssetError(f"{self.path}: joint '{other.name}' closes a loop with '{tie.name}', which is not supported")
+        for one in (tie, *further[:-1]):
+            self.ties.append(one)
+            motions = self._ways(self.reader.motions(one), self._forward(one, part))
+            if len(motions) != 1:
+                raise AssetError(f"{self.path}: joint '{one.name}' is one of several of a body, and has several directions")
+            name = f"{self.structure.parts[part].name}.{one.name}"
+            second = one.frames[1]
+            motion, position = motions[0], self._within(one, motions[0], self.reader.start(one, motions[0], IDENTITY))
+            body = self._add(name, Body(name, BodyKind.LINK, body, *split(P.compose(frame, rest)), virtual=True))
+            self._joint(one.name, body, one, motion, position, P.rotate(second[3:], motion.axis), second[:3])
+            frame, rest = IDENTITY, IDENTITY
+        last = further[-1]
+        self.carrier[part] = body, IDENTITY
+        return last._replace(frames=(last.frames[1], last.frames[1]))
+
+    def _forward(self, tie: Tie, part: str) -> bool:
+        """Whether the file has a part as the second body of a joint."""
+        own = tie.prim.GetRelationship("physics:body1").GetForwardedTargets()
+        return bool(own) and self.structure.owner.get(str(own[0]), BASE) == part
+
     def _attach(self, part: str, tie: Tie) -> None:
         """Put a part onto the body that carries it: rigidly, or through a body for each direction of the joint."""
-        body, frame = self.place[tie.ends[0]]
+        body, frame = self.carrier.get(part, self.place[tie.ends[0]])
         first, second = tie.frames
         motions = self.reader.motions(tie)
-        if motions is None:
-            raise AssetError(f"{self.path}: joint '{tie.name}' ties nothing: all its directions are free; leave it out")
         self.ties.append(tie)
-        own = tie.prim.GetRelationship("physics:body1").GetForwardedTargets()
-        forward = bool(own) and self.structure.owner.get(str(own[0]), BASE) == part
-        start = self._between(tie)
+        forward, start = self._forward(tie, part), self._between(tie) if part not in self.carrier else IDENTITY
         positions = [self._within(tie, m, self.reader.start(tie, m, start)) for m in self._ways(motions, forward)]
         self._fits(tie, motions if forward else self._ways(motions, forward), positions, start)
         if not motions or self._carries_nothing(part):
@@ -214,7 +255,7 @@ class _UsdImport:
         return [motion._replace(axis=-motion.axis) for motion in reversed(motions)]
 
     def _chain(self, part: str, tie: Tie, motions: list[Motion], positions: list[float]) -> None:
-        body, frame = self.place[tie.ends[0]]
+        body, frame = self.carrier.get(part, self.place[tie.ends[0]])
         first, second = tie.frames
         name = self.structure.parts[part].name
         pose = P.compose(frame, first)
@@ -225,7 +266,7 @@ class _UsdImport:
             if last:
                 axis, anchor = P.rotate(second[3:], axis), second[:3]
                 pose = P.compose(pose, P.inverse(second))
-                if len(motions) == 1:
+                if len(motions) == 1 and part not in self.carrier:
                     pose, axis, anchor = self._exactly(tie, frame, pose, axis, anchor)
             number = self._add(
                 name if last else joint,
@@ -336,7 +377,7 @@ class _UsdImport:
     def _within(self, tie: Tie, motion: Motion, position: float) -> float:
         position = round(position, 12) + 0.0
         inside = min(max(position, motion.lower), motion.upper)
-        if abs(inside - position) > 1e-6:
+        if abs(inside - position) > 1e-6 and abs(position) > 1e-4:
             ends = f"[{motion.lower:g}, {motion.upper:g}]"
             self._note("repaired", f"joint '{tie.name}'", f"starts at {position:g}, outside of {ends}; now at the limit")
         return inside if abs(inside) > 1e-7 else min(max(0.0, motion.lower), motion.upper)
@@ -387,15 +428,16 @@ class _UsdImport:
         unit = np.radians(1.0) if joint.type is JointType.REVOLUTE else self.space.metres
         relations = {str(one.GetName()): one for one in prim.GetRelationships()}
         for name, relation in relations.items():
-            if not (name.startswith("physxMimicJoint:") and name.endswith(":referenceJoint")) and name != "newton:mimicJoint":
+            if not (name.startswith("physxMimicJoint:") and name.endswith(":referenceJoint")) and name not in _LEADERS:
                 continue
             targets = relation.GetForwardedTargets()
             if len(targets) != 1:
                 self._note("dropped", f"joint '{tie.name}'", f"follows {len(targets)} joints by '{name}'; it follows none here")
                 return None
             leader = str(targets[0])
-            if name == "newton:mimicJoint":
-                ratio, offset = given(prim, "newton:mimicCoef1"), given(prim, "newton:mimicCoef0") or 0.0
+            if name in _LEADERS:
+                base, way = _LEADERS[name], 1.0 if name == "newton:mimicJoint" else 1.0 / unit
+                ratio, offset = given(prim, f"{base}oef1"), (given(prim, f"{base}oef0") or 0.0) * way
                 multiplier = 1.0 if ratio is None else ratio
             else:
                 base = name.removesuffix("referenceJoint")

@@ -82,16 +82,29 @@ class LookReader:
         prim = shader.GetPrim()
         self.materials[str(prim.GetPath())] = prim
         name = next((name for name in _COLORS if prim.GetAttribute(name)), _COLORS[0])
-        if prim.GetAttribute(name) and prim.GetAttribute(name).HasAuthoredConnections():
+        source = self._source(prim, name)
+        if source is None:
             where = f"material '{material.GetPrim().GetName()}'"
             self._notes.append(ImportNote("dropped", where, "has a texture, which is left out: surfaces have plain colours"))
             return None
-        value = get(prim, name) if prim.GetAttribute(name) else None
+        value = source.Get(pxr().Usd.TimeCode.EarliestTime()) if source else None
         if value is None:
             return None if str(shader.GetIdAttr().Get()) != "UsdPreviewSurface" else (0.18, 0.18, 0.18, 1.0)
         alpha = next((given(prim, key) for key in _OPACITIES if authored(prim, key)), None)
         red, green, blue = (_unit(plain(v)) for v in value)
         return (red, green, blue, 1.0 if alpha is None else _unit(alpha))
+
+    @staticmethod
+    def _source(prim: Any, name: str) -> Any:
+        """The attribute that gives an input its value: its own, or one of the material; None where it is a texture."""
+        lib = pxr()
+        given_by = lib.UsdShade.Input(prim.GetAttribute(name))
+        if not given_by:
+            return prim.GetAttribute(name)
+        found = list(given_by.GetValueProducingAttributes())
+        if not found:
+            return prim.GetAttribute(name)
+        return found[0] if lib.UsdShade.Input.IsInput(found[0]) else None
 
     # ------------------------------------------------------------------ surfaces
 

@@ -13,6 +13,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim_usd.library import pxr
 
+DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 SAME = 2e-6
 """Relative difference of two numbers of which one has been through single precision, or through degrees of such."""
 
@@ -113,3 +114,13 @@ def bound(value: float | None) -> float:
 def finite(value: float, otherwise: float) -> float:
     """The number, or another where it is none."""
     return value if isfinite(value) else otherwise
+
+
+def directions(prim: Any) -> list[tuple[str, float, float]]:
+    """The directions that a joint without a type of its own leaves free, with their limits in units of the file."""
+    found = []
+    for name in DIRECTIONS:
+        low, high = (real(prim, f"limit:{name}:physics:{end}", way * inf) for end, way in (("low", -1), ("high", 1)))
+        if low < high:
+            found.append((name, low, high))
+    return found

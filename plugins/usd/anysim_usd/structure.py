@@ -11,7 +11,7 @@ from anysim.errors import AssetError, listing, suggest
 from anysim.math import pose as P
 from anysim_usd.coverage import JOINTS
 from anysim_usd.library import pxr
-from anysim_usd.numbers import get, quaternion, vector
+from anysim_usd.numbers import DIRECTIONS, directions, get, quaternion, vector
 from anysim_usd.space import IDENTITY, Space
 
 BASE = ""
@@ -47,7 +47,8 @@ class Tie(NamedTuple):
 class Tree:
     """Parts that joints tie to one root, parents before children; `fixed` where the root stands still.
 
-    `ties` are those by which each part but the root is carried, by the part's path.
+    `ties` are those by which each part but the root is carried, by the part's path; `further` the others between the
+    same two, as MuJoCo writes a body of several joints: each moves on from where the one before it has led.
     """
 
     path: str
@@ -55,6 +56,7 @@ class Tree:
     fixed: bool
     parts: list[str] = field(default_factory=list)
     ties: dict[str, Tie] = field(default_factory=dict)
+    further: dict[str, list[Tie]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -109,6 +111,9 @@ class Structure:
             where = f"joint '{name}'"
             if get(prim, "physics:jointEnabled") is False:
                 self._note("dropped", where, "is disabled, and left out")
+                continue
+            if str(prim.GetTypeName()) == "PhysicsJoint" and len(directions(prim)) == len(DIRECTIONS):
+                self._note("dropped", where, "leaves all directions free, and is left out")
                 continue
             ends, frames = list[str](), list[Array]()
             for side in ("0", "1"):
@@ -199,6 +204,9 @@ class Structure:
                 if tie.path in used or other not in group:
                     continue
                 used.add(tie.path)
+                if other in below and tie.kind != "PhysicsFixedJoint" != tree.ties[other].kind:
+                    tree.further.setdefault(other, []).append(tie.turned(here))
+                    continue
                 if other in known:
                     self._loop(tie)
                 known.add(other)

@@ -70,7 +70,7 @@ def unread(prim: Any, *, world: bool = False) -> Iterator[tuple[str, str, str]]:
 
 def _property(prim: Any, found: Any, owner: str) -> Iterator[tuple[str, str, str]]:
     name = str(found.GetName())
-    row = attribute(name)
+    row = attribute(name, str(prim.GetTypeName()))
     is_attribute = isinstance(found, pxr().Usd.Attribute)
     if is_attribute and row is not None and row.fate is not Fate.HARMLESS and found.ValueMightBeTimeVarying():
         yield f"time samples of {name}", "are left out but for the first", owner
