@@ -38,6 +38,7 @@ ROWS: tuple[Row, ...] = (
     # ------------------------------------------------------------------ the stage
     Row("stage", _EXACT, "upAxis metersPerUnit kilogramsPerUnit", "without them USD's defaults: y, 0.01 m, 1 kg"),
     Row("stage", _EXACT, "subLayers references payload variantSets inherits", "of variants those that are selected"),
+    Row("stage", _NOT, "clips", "they are files of their own"),
     Row("stage", _ABOUT, "timeSamples", "of what changes in time, the first value counts"),
     Row("stage", _IDLE, "defaultPrim startTimeCode endTimeCode timeCodesPerSecond framesPerSecond customLayerData"),
     Row("prim", _EXACT, "active instanceable purpose visibility", "what is for guidance or hidden is not drawn"),
@@ -99,9 +100,10 @@ ROWS: tuple[Row, ...] = (
     Row(
         "PhysicsCollisionGroup",
         _ABOUT,
-        "physics:filteredGroups physics:invertFilteredGroups physics:mergeGroup collection:*",
+        "physics:filteredGroups physics:invertFilteredGroups collection:colliders:*",
         "bodies of which all shapes are kept apart never collide",
     ),
+    Row("PhysicsCollisionGroup", _OUT, "physics:mergeGroup", "each prim is a group of its own"),
     Row("CollectionAPI", _IDLE),
     Row("PhysicsFilteredPairsAPI", _EXACT),
     Row("PhysicsFilteredPairsAPI", _ABOUT, "physics:filteredPairs", "bodies of which all shapes are kept apart"),
@@ -117,7 +119,7 @@ ROWS: tuple[Row, ...] = (
     Row("Plane", _ABOUT, "", "a level one at height 0 is the ground of a world; others are a box 1 m thick"),
     Row("Mesh", _ABOUT, "", _HULL),
     Row("Mesh", _EXACT, "points faceVertexCounts faceVertexIndices orientation holeIndices"),
-    Row("Mesh", _ABOUT, "subdivisionScheme", "the mesh itself is what is seen"),
+    Row("Mesh", _IDLE, "subdivisionScheme", "the mesh itself is what is seen"),
     Row("Mesh", _IDLE, "normals doubleSided interpolateBoundary faceVaryingLinearInterpolation triangleSubdivisionRule"),
     Row("Mesh", _IDLE, "primvars:normals primvars:normals:indices"),
     Row("Mesh", _OUT, "cornerIndices cornerSharpnesses creaseIndices creaseLengths creaseSharpnesses", _PLAIN),

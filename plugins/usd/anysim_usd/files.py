@@ -43,14 +43,12 @@ def opened(path: Path, root: Path) -> Iterator[tuple[Any, list[str]]]:
             layers.check()
             stage = lib.Usd.Stage.Open(layers.top)
             errors = [str(error) for error in stage.GetCompositionErrors()]
-            if layers.missing:
-                raise AssetError(f"{path}: {layers.missing[0]}")
-        except lib.Tf.ErrorException as error:
+        except (lib.Tf.ErrorException, UnicodeDecodeError) as error:
             raise AssetError(f"{path}: cannot be read as USD: {_short(error)}") from error
         told = [_plain(error) for error in errors]
         try:
             yield stage, told
-        except lib.Tf.ErrorException as error:
+        except (lib.Tf.ErrorException, UnicodeDecodeError) as error:
             raise AssetError(f"{path}: cannot be read as USD: {_short(error)}") from error
         finally:
             del stage, layers
@@ -70,7 +68,12 @@ class _Layers:
         self.top = self._open(path, str(path.resolve()), str(path), 0)
 
     def check(self) -> None:
-        """Raises AssetError where the composition would have too many prims."""
+        """Raises AssetError where something is missing, or the composition would have too many prims.
+
+        What is missing here may not be looked for elsewhere: the library has search paths of its own.
+        """
+        if self.missing:
+            raise AssetError(f"{self.path}: {self.missing[0]}")
         try:
             weight = self._weight(self.top, "/", ())
         except RecursionError:
@@ -112,8 +115,13 @@ class _Layers:
         else:
             raise AssetError(f"{asked}: is no USD file: it begins with {data[:8]!r}, not with '#usda', 'PXR-USDC' or 'PK'")
         for text in texts:
-            if text[:5] == b"#usda" and _depth(text) > MODEL_DEPTH.value:
-                raise AssetError(f"{asked}: {MODEL_DEPTH.sentence()}")
+            if text[:5] == b"#usda":
+                if _depth(text) > MODEL_DEPTH.value:
+                    raise AssetError(f"{asked}: {MODEL_DEPTH.sentence()}")
+                try:
+                    text.decode("utf-8")
+                except UnicodeDecodeError as error:
+                    raise AssetError(f"{asked}: is no UTF-8 from its byte {error.start} on; save it as UTF-8") from error
 
     def _resolved(self, layer: Any, reference: str) -> str | None:
         """Where a reference of a layer leads; None, with a word in `missing`, where nothing is."""
@@ -125,7 +133,8 @@ class _Layers:
         lib = pxr()
         anchored = lib.Sdf.ComputeAssetPathRelativeToLayer(layer, reference)
         outer, _, inner = anchored.partition("[")
-        found = Path(outer).resolve()
+        home = Path(layer.identifier.partition("[")[0]).parent
+        found = (home / outer).resolve()
         if not found.is_relative_to(self.root):
             raise AssetError(
                 f"{self.path}: refers to {where}, which leaves the asset's root {self.root}: it is {found}; name the "
@@ -171,6 +180,8 @@ class _Layers:
         spec = layer.pseudoRoot if path == "/" else layer.GetPrimAtPath(path)
         if not spec:
             return 0
+        if path != "/" and spec.HasInfo("clips"):
+            raise AssetError(f"{self.path}: prim '{path}' has value clips, which are files; bake them into the stage")
         total = 1 + sum(self._own(base, layer, str(child.path), above) for child in spec.nameChildren)
         if path != "/":
             total += sum(self._variants(base, layer, spec, above)) + sum(self._arcs(base, layer, spec, above))

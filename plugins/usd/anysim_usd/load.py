@@ -68,8 +68,8 @@ def import_usd(
         still = body == PART
         tree = None if still else structure.chosen(body.removeprefix(PART))
         model = _UsdImport(structure, tree, path, visual_error, notes, alone=not body).run()
-    if body.startswith(PART) and tree is not None:
-        model = _unqualified(model, tree.name)
+    if body.startswith(PART):
+        model = _unqualified(model, model.name)
     late = [ImportNote("dropped", "stage", line) for line in told]
     return replace(model, report=(*model.report, *late))
 
@@ -512,7 +512,10 @@ class _UsdImport:
         if self.tree is not None and BASE in parts:
             parts.discard(BASE)
         for part in parts:
-            yield from self.content.get(part, ())
+            shapes_alone = part == BASE  # the scene's reader tells of the rest
+            for prim in self.content.get(part, ()):
+                if not shapes_alone or str(prim.GetTypeName()) in (*KINDS, "GeomSubset"):
+                    yield prim
         yield from (tie.prim for tie in self.ties)
 
     def _collides(self) -> dict[str, list[Any]]:

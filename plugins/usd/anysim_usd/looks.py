@@ -73,8 +73,8 @@ class LookReader:
 
     def _shaded(self, material: Any) -> Rgba | None:
         """The colour of a material's shader; None where it has none that is plain."""
-        for context in ([], ["mdl"]):
-            shader, _, _ = material.ComputeSurfaceSource(context) if context else material.ComputeSurfaceSource()
+        for context in ("", "mdl"):
+            shader, _, _ = material.ComputeSurfaceSource(context)
             if shader:
                 break
         else:

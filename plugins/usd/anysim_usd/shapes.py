@@ -249,9 +249,9 @@ def is_level(prim: Any, space: Space) -> bool:
 def _placed(kind: str, size: dict[str, float], place: Placed, turn: Array) -> Solid:
     """A solid of the file where it is: itself where scale leaves it one, else its triangles."""
     axes = np.abs(place.size)
-    along = P.rotate(turn, np.array([0.0, 0.0, 1.0]))
-    stretch = float(np.abs(along) @ axes)
-    across = axes[np.abs(along) < 0.5]
+    along = np.round(np.abs(P.rotate(turn, np.array([0.0, 0.0, 1.0]))))
+    stretch = float(along @ axes)
+    across = axes[along < 0.5]
     even = place.straight and float(np.ptp(across)) <= _EVEN * float(axes.max(initial=0.0)) if kind != "Cube" else place.straight
     pose = P.compose(place.pose, np.array([0.0, 0.0, 0.0, *turn]))
     wide, half = float(across.mean()) * size["radius"], stretch * size["height"] / 2

@@ -64,8 +64,6 @@ def unread(prim: Any, *, world: bool = False) -> Iterator[tuple[str, str, str]]:
             yield f"schema {name}", _left_out(row.text if row else "it is not known"), owner
     for found in prim.GetAuthoredProperties():
         yield from _property(prim, found, owner)
-    if prim.HasAuthoredMetadata("clips"):
-        yield "clips", "is left out: nothing changes in time", owner
 
 
 def _property(prim: Any, found: Any, owner: str) -> Iterator[tuple[str, str, str]]:
