@@ -69,7 +69,7 @@ def test_3mf_has_a_unit_and_stays_within_its_package(folder: Path) -> None:
     np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), np.array((0.2, 0.4, 0.6)) * 25.4, atol=1e-6)
     hull = meshes.collision_mesh(changed("plain.3mf", b' unit="millimeter"', b""))
     np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), (0.2, 0.4, 0.6), atol=1e-6)
-    with pytest.raises(AssetError, match="its unit is 'cubit'; the units of a .3mf are micron, millimeter"):
+    with pytest.raises(AssetError, match=r"its unit is 'cubit'; the units of a .3mf are micron, millimeter"):
         meshes.collision_mesh(changed("cubit.3mf", b'unit="millimeter"', b'unit="cubit"'))
     with pytest.raises(AssetError, match="made of other objects"):
         meshes.collision_mesh(changed("nested.3mf", b"<mesh>", b"<components/><mesh>"))

@@ -15,7 +15,6 @@ from anysim.errors import PluginError, SpecError, SpecIssue, listing
 from anysim.families.base import FamilyPart, FamilySetting, FamilyState
 from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
-from anysim.model.appearance import rgb
 from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
 from anysim_schemas.base import Spec
@@ -39,7 +38,6 @@ class Soft(CoSolver):
 
     drawn = True
     label: ClassVar[str]
-    tint: ClassVar[tuple[float, float, float]]
     drawn_keys: ClassVar[tuple[str, ...]] = ("drag", "friction")
 
     # ------------------------------------------------------------------ what kinds differ in
@@ -259,13 +257,9 @@ class Soft(CoSolver):
         middle = self.x[env_ids].mean(axis=1)
         return {"middle": middle, "momentum": self.momentum(env_ids), "received": self.received[env_ids]}
 
-    def color(self) -> tuple[float, float, float]:
-        """Red, green and blue in images."""
-        return self.tint if self.soft.color is None else rgb(self.soft.color)
-
     def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
         from anysim_particles.draw import draw_triangles
 
         mark = self.setting.entities[0] + 1
         for row, env in enumerate(env_ids.tolist()):
-            draw_triangles(self.x[env], self.faces, self.color(), mark, view, row, images)
+            draw_triangles(self.x[env], self.faces, self.color, mark, view, row, images)

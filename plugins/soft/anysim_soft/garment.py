@@ -172,5 +172,5 @@ class Garment(Soft):
         return {name: {**known, **more} for name, known in super().facts(env).items()}
 
     def recorded(self, env_ids: Array) -> Mapping[str, Array]:
-        more = {"pads": self.pads.stage[env_ids].copy()} if len(self.pads) else {}
+        more = {"pads": self.pads.stage[env_ids].astype(np.int8)} if len(self.pads) else {}
         return {**super().recorded(env_ids), **more}

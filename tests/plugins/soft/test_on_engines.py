@@ -94,7 +94,7 @@ def test_images_see_matter_and_what_hides_it(engine, kind):
         depth = seen["depth"][0][ids == mine]
         assert depth.min() > 0.7 * away.min()
         assert depth.max() < away.max() + 0.01
-        tint, color = seen["rgb"][0][ids == mine].mean(axis=0), np.array(it.color())
+        tint, color = seen["rgb"][0][ids == mine].mean(axis=0), np.array(it.color)
         assert np.abs(tint / tint.sum() - color / color.sum()).max() < 0.05
 
 
