@@ -29,9 +29,9 @@ def export_model(
 ) -> None:
     """Write a robot, an object or a world as URDF, MJCF or USD files, with their meshes beside them.
 
-    MJCF and USD take a whole world: bodies, drives, lights, cameras, ground. A URDF is one tree, so that each entity of a
-    world gets a file, and an SRDF beside it for its groups, its home and the pairs that never collide. What the format
-    cannot hold is told, line by line.
+    MJCF and USD take a whole world: bodies, drives, lights, cameras, ground. A URDF is one tree, so that each entity of
+    a world gets a file, and an SRDF beside it for its groups, its home and the pairs that never collide. What the
+    format cannot hold is told, line by line.
 
     Examples:
       anysim export-model franka_panda --to urdf

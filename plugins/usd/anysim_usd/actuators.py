@@ -14,7 +14,11 @@ from anysim_usd.structure import Structure
 
 
 def actuators(
-    structure: Structure, numbers: Mapping[str, tuple[int, bool]], taken: set[int], space: Space, notes: list[ImportNote]
+    structure: Structure,
+    numbers: Mapping[str, tuple[int, bool]],
+    taken: set[int],
+    space: Space,
+    notes: list[ImportNote],
 ) -> list[ActuatorHint]:
     """The drives that prims `MjcActuator` declare for joints, by path their number and whether they turn.
 

@@ -120,7 +120,9 @@ ROWS: tuple[Row, ...] = (
     Row("Mesh", _ABOUT, "", _HULL),
     Row("Mesh", _EXACT, "points faceVertexCounts faceVertexIndices orientation holeIndices"),
     Row("Mesh", _IDLE, "subdivisionScheme", "the mesh itself is what is seen"),
-    Row("Mesh", _IDLE, "normals doubleSided interpolateBoundary faceVaryingLinearInterpolation triangleSubdivisionRule"),
+    Row(
+        "Mesh", _IDLE, "normals doubleSided interpolateBoundary faceVaryingLinearInterpolation triangleSubdivisionRule"
+    ),
     Row("Mesh", _IDLE, "primvars:normals primvars:normals:indices"),
     Row("Mesh", _OUT, "cornerIndices cornerSharpnesses creaseIndices creaseLengths creaseSharpnesses", _PLAIN),
     Row("Mesh", _OUT, "velocities accelerations", "bodies are rigid"),
@@ -153,7 +155,9 @@ ROWS: tuple[Row, ...] = (
     Row("PhysxSceneAPI", _OUT, "physxScene:*", _SOLVER),
     Row("Camera", _EXACT, "", "of a world; of an asset it is left out"),
     Row("Camera", _EXACT, "focalLength verticalAperture horizontalAperture clippingRange", "of a world"),
-    Row("Camera", _OUT, "fStop focusDistance exposure projection shutter:* horizontalApertureOffset", "it is a pinhole"),
+    Row(
+        "Camera", _OUT, "fStop focusDistance exposure projection shutter:* horizontalApertureOffset", "it is a pinhole"
+    ),
     Row("Camera", _OUT, "verticalApertureOffset clippingPlanes stereoRole exposure:*", "it is a pinhole"),
     *(Row(kind, _ABOUT, "", "of a world: a light in one direction") for kind in ("DistantLight",)),
     *(
@@ -170,15 +174,22 @@ ROWS: tuple[Row, ...] = (
     *(
         Row(kind, _IDLE)
         for kind in (
-            "PhysxRigidBodyAPI", "PhysxArticulationAPI", "PhysxJointAPI", "PhysxJointAxisAPI", "PhysxCollisionAPI",
-            "PhysxMaterialAPI", "PhysxConvexHullCollisionAPI", "PhysicsJointStateAPI", "PhysxLimitAPI", "IsaacLinkAPI",
-            "IsaacJointAPI", "IsaacRobotAPI", "PhysxMimicJointAPI", "PhysxContactReportAPI",
-        )
-    ),  # fmt: skip
+            "PhysxRigidBodyAPI PhysxArticulationAPI PhysxJointAPI PhysxJointAxisAPI PhysxCollisionAPI "
+            "PhysxMaterialAPI PhysxConvexHullCollisionAPI PhysicsJointStateAPI PhysxLimitAPI IsaacLinkAPI "
+            "IsaacJointAPI IsaacRobotAPI PhysxMimicJointAPI PhysxContactReportAPI"
+        ).split()
+    ),
     Row("PhysxRigidBodyAPI", _EXACT, "physxRigidBody:disableGravity"),
-    Row("PhysxRigidBodyAPI", _EXACT, "physxRigidBody:linearDamping physxRigidBody:angularDamping", "of what floats alone"),
+    Row(
+        "PhysxRigidBodyAPI",
+        _EXACT,
+        "physxRigidBody:linearDamping physxRigidBody:angularDamping",
+        "of what floats alone",
+    ),
     Row("PhysxRigidBodyAPI", _OUT, "physxRigidBody:*", _SOLVER),
-    Row("PhysxArticulationAPI", _OUT, "physxArticulation:enabledSelfCollisions", "`self_collision` of the entry has it"),
+    Row(
+        "PhysxArticulationAPI", _OUT, "physxArticulation:enabledSelfCollisions", "`self_collision` of the entry has it"
+    ),
     Row("PhysxArticulationAPI", _OUT, "physxArticulation:*", _SOLVER),
     Row("PhysxJointAPI", _EXACT, "physxJoint:armature"),
     Row("PhysxJointAPI", _EXACT, "physxJoint:maxJointVelocity", "in degrees, where it turns"),
@@ -204,11 +215,11 @@ ROWS: tuple[Row, ...] = (
     *(
         Row(kind, _IDLE)
         for kind in (
-            "MjcSceneAPI", "MjcJointAPI", "MjcCollisionAPI", "MjcMaterialAPI", "MjcBodyAPI", "MjcImageableAPI",
-            "MjcMeshCollisionAPI", "NewtonJointAPI", "NewtonMaterialAPI", "NewtonMimicAPI", "NewtonArticulationRootAPI",
-            "NewtonCollisionAPI", "NewtonMeshCollisionAPI", "NewtonSceneAPI", "NewtonMassAPI",
-        )
-    ),  # fmt: skip
+            "MjcSceneAPI MjcJointAPI MjcCollisionAPI MjcMaterialAPI MjcBodyAPI MjcImageableAPI "
+            "MjcMeshCollisionAPI NewtonJointAPI NewtonMaterialAPI NewtonMimicAPI NewtonArticulationRootAPI "
+            "NewtonCollisionAPI NewtonMeshCollisionAPI NewtonSceneAPI NewtonMassAPI"
+        ).split()
+    ),
     *(Row(kind, _EXACT, "", "a frame") for kind in ("MjcSiteAPI", "NewtonSiteAPI")),
     Row("MjcSceneAPI", _EXACT, "mjc:option:timestep mjc:option:cone mjc:option:impratio", "of a world"),
     Row("MjcSceneAPI", _OUT, "mjc:option:* mjc:flag:* mjc:compiler:*", _SOLVER),
@@ -231,7 +242,9 @@ ROWS: tuple[Row, ...] = (
     Row("NewtonJointAPI", _EXACT, "newton:armature newton:friction"),
     Row("NewtonJointAPI", _EXACT, "newton:damping newton:velocityLimit", "in degrees, where it turns"),
     Row("NewtonMaterialAPI", _EXACT, "newton:torsionalFriction newton:rollingFriction"),
-    Row("NewtonMimicAPI", _EXACT, "newton:mimicJoint newton:mimicCoef0 newton:mimicCoef1", "in degrees, where it turns"),
+    Row(
+        "NewtonMimicAPI", _EXACT, "newton:mimicJoint newton:mimicCoef0 newton:mimicCoef1", "in degrees, where it turns"
+    ),
     Row("NewtonMimicAPI", _IDLE, "newton:mimicEnabled"),
     Row("NewtonJointAPI", _OUT, "newton:*", _SOLVER),
     # ------------------------------------------------------------------ as anysim writes them

@@ -25,7 +25,9 @@ from anysim_schemas.limits import (
 from anysim_usd.library import pxr, quiet
 
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
-_TOKENS = re.compile(rb"""'{3}.*?'{3}|"{3}.*?"{3}|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|\#[^\n]*|[\[({]|[\])}]""", re.DOTALL)
+_TOKENS = re.compile(
+    rb"""'{3}.*?'{3}|"{3}.*?"{3}|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|\#[^\n]*|[\[({]|[\])}]""", re.DOTALL
+)
 _LISTS = ("explicitItems", "prependedItems", "appendedItems", "addedItems")
 
 
@@ -94,7 +96,9 @@ class _Layers:
         self._look(file, identifier, asked)
         layer = lib.Sdf.Layer.FindOrOpen(identifier)
         if not layer:
-            raise AssetError(f"{asked}: cannot be read as USD: it is damaged, or of a version that usd-core does not know")
+            raise AssetError(
+                f"{asked}: cannot be read as USD: it is damaged, or of a version that usd-core does not know"
+            )
         self._layers[identifier] = layer
         for reference in filter(None, sorted(layer.GetCompositionAssetDependencies())):
             inner = self._resolved(layer, reference)
@@ -113,7 +117,9 @@ class _Layers:
         elif data[:8] == b"PXR-USDC" or data[:5] == b"#usda":
             texts = [data]
         else:
-            raise AssetError(f"{asked}: is no USD file: it begins with {data[:8]!r}, not with '#usda', 'PXR-USDC' or 'PK'")
+            raise AssetError(
+                f"{asked}: is no USD file: it begins with {data[:8]!r}, not with '#usda', 'PXR-USDC' or 'PK'"
+            )
         for text in texts:
             if text[:5] == b"#usda":
                 if _depth(text) > MODEL_DEPTH.value:
@@ -121,7 +127,9 @@ class _Layers:
                 try:
                     text.decode("utf-8")
                 except UnicodeDecodeError as error:
-                    raise AssetError(f"{asked}: is no UTF-8 from its byte {error.start} on; save it as UTF-8") from error
+                    raise AssetError(
+                        f"{asked}: is no UTF-8 from its byte {error.start} on; save it as UTF-8"
+                    ) from error
 
     def _resolved(self, layer: Any, reference: str) -> str | None:
         """Where a reference of a layer leads; None, with a word in `missing`, where nothing is."""

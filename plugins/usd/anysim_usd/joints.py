@@ -1,4 +1,4 @@
-"""What a joint lets move: its directions, their limits, and what USD, PhysX, MuJoCo and Newton say of each."""
+"""Directions that a joint lets move, their limits, and what USD, PhysX, MuJoCo and Newton say of each."""
 
 from math import degrees, inf, isfinite, radians
 from typing import Any, NamedTuple
@@ -9,11 +9,23 @@ from anysim.assets.model import ActuatorHint, ImportNote
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import ControlMode
-from anysim_usd.numbers import DIRECTIONS, applied, authored, bound, directions, exact, exact_vector, get, given, real
+from anysim_usd.numbers import (
+    DIRECTIONS,
+    applied,
+    authored,
+    bound,
+    directions,
+    exact,
+    exact_vector,
+    get,
+    given,
+    real,
+    same,
+)
 from anysim_usd.space import Space
 from anysim_usd.structure import Tie
 
-_CALLED = dict(zip(DIRECTIONS, ("x", "y", "z", "roll", "pitch", "yaw"), strict=True))
+_CALLED: dict[str, str] = dict(zip(DIRECTIONS, ("x", "y", "z", "roll", "pitch", "yaw"), strict=True))
 _AXES = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
 
 
@@ -33,7 +45,7 @@ class Motion(NamedTuple):
 
 
 class JointReader:
-    """Reads joints of a stage. What an import scales is lengths; forces, dampings and drives stay, as of other files."""
+    """Reads joints of a stage. What an import scales is lengths; forces and drives stay, as of other files."""
 
     def __init__(self, space: Space, notes: list[ImportNote]) -> None:
         self._length, self._metres, self._kilograms, self._notes = space.metres, space.unit, space.weight, notes
@@ -103,11 +115,14 @@ class JointReader:
         speed = self._first(
             tie, motion, "physxJointAxis:*:maxJointVelocity", "physxJoint:maxJointVelocity", "newton:velocityLimit"
         )
-        effort = self._of(tie, motion, "drive:*:physics:maxForce")
+        effort = bound(self._of(tie, motion, "drive:*:physics:maxForce"))
+        own, whole = given(prim, "anysim:driveLimit"), given(prim, "anysim:effortLimit")
+        if own is not None and whole is not None and same(own, effort):
+            effort = whole  # of the joint, beside that of its drive
         way = radians(1.0) if motion.turns else 1.0
         rough = {  # in units of the file, turns in radians
             "velocityLimit": bound(None if speed is None else speed * way),
-            "effortLimit": bound(effort),
+            "effortLimit": effort,
             "damping": damping or 0.0,
             "friction": self._friction(tie, motion),
             "armature": armature or 0.0,
@@ -137,7 +152,9 @@ class JointReader:
 
     def _friction(self, tie: Tie, motion: Motion) -> float:
         """The dry friction, of what the schemas have for it."""
-        found = self._first(tie, motion, "physxJointAxis:*:dynamicFrictionEffort", "mjc:frictionloss", "newton:friction")
+        found = self._first(
+            tie, motion, "physxJointAxis:*:dynamicFrictionEffort", "mjc:frictionloss", "newton:friction"
+        )
         held = self._of(tie, motion, "physxJointAxis:*:staticFrictionEffort")
         if found is not None and held is not None and held != found:
             self._note("info", tie, f"holds up to {held:g} at rest and {found:g} when it moves; friction is the second")
@@ -168,7 +185,7 @@ class JointReader:
         """The drive of a joint that the file declares."""
         prim = tie.prim
         instance = next((i for i in motion.instances if f"PhysicsDriveAPI:{i}" in applied(prim)), None)
-        if instance is None:
+        if instance is None or get(prim, "anysim:undriven"):
             return None
         drive = f"drive:{instance}:physics"
         if str(get(prim, f"{drive}:type") or "force") != "force":
@@ -202,4 +219,3 @@ def moved(motion: Motion, position: float) -> Array:
     if not motion.turns:
         return np.array([*(motion.axis * position), 0.0, 0.0, 0.0, 1.0])
     return np.array([0.0, 0.0, 0.0, *P.from_axis_angle(motion.axis, np.array(position))])
-

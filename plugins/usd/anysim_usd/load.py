@@ -80,7 +80,9 @@ def _unqualified(model: ImportedModel, name: str) -> ImportedModel:
         return model
     links = {"" if link == name else link: body for link, body in model.links.items()}
     geom_links = tuple("" if link == name else link for link in model.geom_links)
-    return replace(model, bodies=(replace(model.bodies[0], name=""), *model.bodies[1:]), links=links, geom_links=geom_links)
+    return replace(
+        model, bodies=(replace(model.bodies[0], name=""), *model.bodies[1:]), links=links, geom_links=geom_links
+    )
 
 
 class _UsdImport:
@@ -128,7 +130,9 @@ class _UsdImport:
         self._frames()
         self._follow()
         self._inertials()
-        numbers = {path: (number, self.joints[number].type is JointType.REVOLUTE) for path, number in self.number.items()}
+        numbers = {
+            path: (number, self.joints[number].type is JointType.REVOLUTE) for path, number in self.number.items()
+        }
         taken = {hint.joint for hint in self.hints}
         self.hints += actuators(self.structure, numbers, taken, self.space, self.notes)
         if tree is not None and self.alone and tree.root != BASE:
@@ -170,7 +174,9 @@ class _UsdImport:
         if tree.root == BASE:
             taken = {part.name for part in self.structure.parts.values()}
             name = next(name for name in ("base", *(f"base_{i}" for i in range(len(taken)))) if name not in taken)
-            self._note("info", f"tree '{tree.name}'", "moves against the world; it gets a fixed base at the stage's origin")
+            self._note(
+                "info", f"tree '{tree.name}'", "moves against the world; it gets a fixed base at the stage's origin"
+            )
             self._add(name, Body(name, BodyKind.STATIC))
             self.place[BASE] = 0, IDENTITY
             return
@@ -202,12 +208,16 @@ class _UsdImport:
             there = P.compose(other.frames[0], P.inverse(other.frames[1]))
             gap = P.compose(P.inverse(rest), there)
             if max(np.linalg.norm(gap[:3]), np.linalg.norm(P.rotation_vector(gap[3:]))) > 10 * _APART:
-                raise AssetError(f"{self.path}: joint '{other.name}' closes a loop with '{tie.name}', which is not supported")
+                raise AssetError(
+                    f"{self.path}: joint '{other.name}' closes a loop with '{tie.name}', which is not supported"
+                )
         for one in (tie, *further[:-1]):
             self.ties.append(one)
             motions = self._ways(self.reader.motions(one), self._forward(one, part))
             if len(motions) != 1:
-                raise AssetError(f"{self.path}: joint '{one.name}' is one of several of a body, and has several directions")
+                raise AssetError(
+                    f"{self.path}: joint '{one.name}' is one of several of a body, and has several directions"
+                )
             name = f"{self.structure.parts[part].name}.{one.name}"
             second = one.frames[1]
             motion, position = motions[0], self._within(one, motions[0], self.reader.start(one, motions[0], IDENTITY))
@@ -379,7 +389,9 @@ class _UsdImport:
         inside = min(max(position, motion.lower), motion.upper)
         if abs(inside - position) > 1e-6 and abs(position) > 1e-4:
             ends = f"[{motion.lower:g}, {motion.upper:g}]"
-            self._note("repaired", f"joint '{tie.name}'", f"starts at {position:g}, outside of {ends}; now at the limit")
+            self._note(
+                "repaired", f"joint '{tie.name}'", f"starts at {position:g}, outside of {ends}; now at the limit"
+            )
         return inside if abs(inside) > 1e-7 else min(max(0.0, motion.lower), motion.upper)
 
     def _joint(
@@ -396,8 +408,8 @@ class _UsdImport:
             lower=float(lower),
             upper=float(upper),
             initial=position,
-            **self.reader.passive(tie, motion),
         )
+        made = replace(made, **self.reader.passive(tie, motion))
         for key in ("damping", "friction", "armature", "stiffness"):
             if getattr(made, key) < 0:
                 self._note("repaired", f"joint '{name}'", f"has a {key} of {getattr(made, key):g}, now 0")
@@ -416,7 +428,9 @@ class _UsdImport:
                 leader, multiplier, offset = found
                 number = self.number[tie.path]
                 if leader not in self.number or self.number[leader] == number:
-                    self._note("dropped", f"joint '{tie.name}'", f"follows '{leader}', which is no joint that moves here")
+                    self._note(
+                        "dropped", f"joint '{tie.name}'", f"follows '{leader}', which is no joint that moves here"
+                    )
                     continue
                 mimic = Mimic(self.number[leader], multiplier, offset)
                 start = mimic.position(self.joints[mimic.joint].initial)
@@ -432,7 +446,9 @@ class _UsdImport:
                 continue
             targets = relation.GetForwardedTargets()
             if len(targets) != 1:
-                self._note("dropped", f"joint '{tie.name}'", f"follows {len(targets)} joints by '{name}'; it follows none here")
+                self._note(
+                    "dropped", f"joint '{tie.name}'", f"follows {len(targets)} joints by '{name}'; it follows none here"
+                )
                 return None
             leader = str(targets[0])
             if name in _LEADERS:

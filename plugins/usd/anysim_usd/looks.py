@@ -8,7 +8,7 @@ import numpy as np
 from anysim.assets.model import ImportNote
 from anysim.model.world import Surface
 from anysim_usd.library import pxr
-from anysim_usd.numbers import authored, get, given, plain
+from anysim_usd.numbers import authored, given, plain
 from anysim_usd.space import Space
 
 GREY = (0.7, 0.7, 0.7, 1.0)
@@ -85,7 +85,9 @@ class LookReader:
         source = self._source(prim, name)
         if source is None:
             where = f"material '{material.GetPrim().GetName()}'"
-            self._notes.append(ImportNote("dropped", where, "has a texture, which is left out: surfaces have plain colours"))
+            self._notes.append(
+                ImportNote("dropped", where, "has a texture, which is left out: surfaces have plain colours")
+            )
             return None
         value = source.Get(pxr().Usd.TimeCode.EarliestTime()) if source else None
         if value is None:

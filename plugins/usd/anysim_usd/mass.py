@@ -48,7 +48,9 @@ class MassReader:
         total = mass * kilograms if mass > 0 else whole.mass
         if mass <= 0:
             self._notes.append(
-                ImportNote("info", f"body '{name}'", f"says no mass; that of its shapes is {total:.4g} kg, of their density")
+                ImportNote(
+                    "info", f"body '{name}'", f"says no mass; that of its shapes is {total:.4g} kg, of their density"
+                )
             )
         matrix = inertia.tensor(inertia.scaled(whole, total / whole.mass))
         if tensor is not None:

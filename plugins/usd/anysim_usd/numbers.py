@@ -105,7 +105,7 @@ def exact_vector(prim: Any, name: str, rough: Array, least: float = 0.0) -> Arra
 
 
 def bound(value: float | None) -> float:
-    """A limit of effort or speed: none where it is not there, is 0 or infinite, or as large as single precision goes."""
+    """A limit of effort or speed: none where it is not there, is 0, or as large as single precision goes."""
     if value is None or not value > 0 or isinf(value) or value >= 3.4e38:
         return inf
     return value

@@ -42,7 +42,8 @@ def excluded_pairs(
             partly.append(f"{known[low].name} and {known[high].name}")
     notes = []
     if partly:
-        text = f"keep apart only some shapes of {len(partly)} pairs of bodies, which all meet here: {', '.join(partly[:3])}"
+        some = ", ".join(partly[:3])
+        text = f"keep apart only some shapes of {len(partly)} pairs of bodies, which all meet here: {some}"
         notes.append(ImportNote("dropped", "collision filters", text))
     return frozenset(found), notes
 

@@ -175,8 +175,11 @@ class _Scene:
         turn = P.multiply(pose[3:], _OPTICAL)
         ahead = P.rotate(turn, np.array([0.0, 0.0, 1.0]))
         camera: dict[str, Any] = {
-            "from": pose[:3].tolist(), "look_at": (pose[:3] + ahead).tolist(), "fov": fov, "size": pixels,
-        }  # fmt: skip
+            "from": pose[:3].tolist(),
+            "look_at": (pose[:3] + ahead).tolist(),
+            "fov": fov,
+            "size": pixels,
+        }
         if authored(prim, "clippingRange"):
             near, far = (float(v) * self.space.unit for v in vector(prim, "clippingRange", (0.01, 20.0)))
             if 0 < near < far:
@@ -184,7 +187,9 @@ class _Scene:
         owner = self.structure.owner[str(prim.GetPath())]
         if owner != BASE:
             name = self.structure.parts[owner].name
-            self.notes.append(ImportNote("info", f"camera '{prim.GetName()}'", f"moves with '{name}'; it stands still here"))
+            self.notes.append(
+                ImportNote("info", f"camera '{prim.GetName()}'", f"moves with '{name}'; it stands still here")
+            )
         up = P.rotate(turn, np.array([0.0, -1.0, 0.0]))
         if float(up[2]) < 0.999 * float(np.sqrt(max(0.0, 1.0 - ahead[2] ** 2))) or abs(float(ahead[2])) > 0.9999:
             self.notes.append(ImportNote("info", f"camera '{prim.GetName()}'", "is rolled; it is upright here"))

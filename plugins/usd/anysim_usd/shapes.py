@@ -19,7 +19,7 @@ from anysim_schemas.limits import MESH_FACES
 from anysim_usd.library import pxr
 from anysim_usd.looks import LookReader, Rgba
 from anysim_usd.numbers import get, real
-from anysim_usd.space import Placed, Space
+from anysim_usd.space import Placement, Space
 
 KINDS = frozenset(("Cube", "Sphere", "Cylinder", "Cylinder_1", "Capsule", "Capsule_1", "Cone", "Plane", "Mesh"))
 _TO_Z = {  # the turn (4,) xyzw from a shape along z to one along an axis
@@ -44,7 +44,9 @@ class Solid(NamedTuple):
 class ShapeReader:
     """Collects geoms and meshes of the bodies of a model, in the frames of these."""
 
-    def __init__(self, path: Path, space: Space, looks: LookReader, visual_error: float, notes: list[ImportNote]) -> None:
+    def __init__(
+        self, path: Path, space: Space, looks: LookReader, visual_error: float, notes: list[ImportNote]
+    ) -> None:
         self._path, self._space, self.looks, self._notes = path, space, looks, notes
         self._error = visual_error
         self.geoms: list[Geom] = []
@@ -167,7 +169,9 @@ class ShapeReader:
         if kind not in ("convexHull", "none"):
             self._note("info", f"mesh '{prim.GetName()}'", f"collides as {kind} in its file, here as its convex hull")
         elif kind == "none" and not _convex(solid.vertices, np.asarray(solid.faces)):
-            self._note("info", f"mesh '{prim.GetName()}'", "collides by each triangle in its file, here as its convex hull")
+            self._note(
+                "info", f"mesh '{prim.GetName()}'", "collides by each triangle in its file, here as its convex hull"
+            )
         return solid
 
     # ------------------------------------------------------------------ shapes
@@ -200,14 +204,14 @@ class ShapeReader:
             return self._plane(prim, place, turn, size)
         return _placed(kind, size, place, turn)
 
-    def _plane(self, prim: Any, place: Placed, turn: Array, size: dict[str, float]) -> Solid:
+    def _plane(self, prim: Any, place: Placement, turn: Array, size: dict[str, float]) -> Solid:
         """A level ground at height 0 as itself, another as a box."""
         pose = P.compose(place.pose, np.array([0.0, 0.0, 0.0, *turn]))
         wide = (_WIDE, _WIDE) if collides(prim) else (min(size["width"], _WIDE), min(size["length"], _WIDE))
         below = np.array([0.0, 0.0, -_THICK / 2, 0.0, 0.0, 0.0, 1.0])
         return Solid(Box((wide[0] / 2, wide[1] / 2, _THICK / 2)), P.compose(pose, below))
 
-    def _mesh(self, prim: Any, place: Placed) -> Solid | None:
+    def _mesh(self, prim: Any, place: Placement) -> Solid | None:
         points, faces = mesh_of(prim, self._path)
         check(self._path, MESH_FACES, len(faces))
         if not len(faces):
@@ -246,13 +250,17 @@ def is_level(prim: Any, space: Space) -> bool:
     return abs(float(normal[2]) - 1.0) < 1e-9 and abs(float(place.position[2])) < 1e-9
 
 
-def _placed(kind: str, size: dict[str, float], place: Placed, turn: Array) -> Solid:
+def _placed(kind: str, size: dict[str, float], place: Placement, turn: Array) -> Solid:
     """A solid of the file where it is: itself where scale leaves it one, else its triangles."""
     axes = np.abs(place.size)
     along = np.round(np.abs(P.rotate(turn, np.array([0.0, 0.0, 1.0]))))
     stretch = float(along @ axes)
     across = axes[along < 0.5]
-    even = place.straight and float(np.ptp(across)) <= _EVEN * float(axes.max(initial=0.0)) if kind != "Cube" else place.straight
+    even = (
+        place.straight and float(np.ptp(across)) <= _EVEN * float(axes.max(initial=0.0))
+        if kind != "Cube"
+        else place.straight
+    )
     pose = P.compose(place.pose, np.array([0.0, 0.0, 0.0, *turn]))
     wide, half = float(across.mean()) * size["radius"], stretch * size["height"] / 2
     if kind == "Cube" and even and axes.min() > 0:
@@ -266,7 +274,7 @@ def _placed(kind: str, size: dict[str, float], place: Placed, turn: Array) -> So
     if kind == "Cylinder" and even:
         return Solid(Cylinder(wide, half), pose)
     made = {
-        "Cube": Box((size["size"] / 2,) * 3),
+        "Cube": Box((size["size"] / 2, size["size"] / 2, size["size"] / 2)),
         "Sphere": Sphere(size["radius"]),
         "Capsule": Capsule(size["radius"], size["height"] / 2),
         "Cylinder": Cylinder(size["radius"], size["height"] / 2),

@@ -18,7 +18,7 @@ _STRAIGHT = 1e-6  # how far from right angles axes may be that are only stretche
 _LONG = 1e-9
 
 
-class Placed:
+class Placement:
     """An affine map (3, 4) from a prim's own coordinates, lengths in metres, to the world, z up."""
 
     def __init__(self, linear: Array, position: Array) -> None:
@@ -48,7 +48,8 @@ class Space:
     def __init__(self, stage: Any, path: Path, scale: float, notes: list[ImportNote]) -> None:
         lib = pxr()
         self.unit, self.weight = (
-            float(value(stage)) for value in (lib.UsdGeom.GetStageMetersPerUnit, lib.UsdPhysics.GetStageKilogramsPerUnit)
+            float(value(stage))
+            for value in (lib.UsdGeom.GetStageMetersPerUnit, lib.UsdPhysics.GetStageKilogramsPerUnit)
         )
         for what, value in (("metersPerUnit", self.unit), ("kilogramsPerUnit", self.weight)):
             if not (isfinite(value) and value > 0):
@@ -61,18 +62,20 @@ class Space:
         """The pose (7,) of the stage's coordinates in the world."""
         self.scale = scale
         self._cache = lib.UsdGeom.XformCache(lib.Usd.TimeCode.EarliestTime())
-        self._places: dict[str, Placed] = {}
+        self._places: dict[str, Placement] = {}
         if not lib.UsdGeom.StageHasAuthoredMetersPerUnit(stage):
             notes.append(ImportNote("info", "stage", "says no metersPerUnit; USD's default is 0.01 m, a centimetre"))
         if not stage.HasAuthoredMetadata("upAxis"):
             notes.append(ImportNote("info", "stage", "says no upAxis; USD's default is y"))
 
-    def of(self, prim: Any) -> Placed:
+    def of(self, prim: Any) -> Placement:
         """Where a prim is."""
         key = str(prim.GetPath())
         if key not in self._places:
-            matrix = np.array(self._cache.GetLocalToWorldTransform(prim))  # of rows: points are multiplied from the left
+            matrix = np.array(
+                self._cache.GetLocalToWorldTransform(prim)
+            )  # of rows: points are multiplied from the left
             if not np.isfinite(matrix).all():
                 raise AssetError(f"prim '{key}' has a place that is no number")
-            self._places[key] = Placed(self.turn @ matrix[:3, :3].T, self.turn @ matrix[3, :3] * self.metres)
+            self._places[key] = Placement(self.turn @ matrix[:3, :3].T, self.turn @ matrix[3, :3] * self.metres)
         return self._places[key]

@@ -1,6 +1,6 @@
 """The bodies of a stage, the joints between them, and the trees that these make."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -86,7 +86,9 @@ class Structure:
                 still = bool(get(prim, "physics:kinematicEnabled"))
                 self.parts[here] = Part(here, _called(prim), prim, space.of(prim).pose, still)
                 if still:
-                    self._note("info", f"body '{_called(prim)}'", "is kinematic: it stands still here, until it is moved")
+                    self._note(
+                        "info", f"body '{_called(prim)}'", "is kinematic: it stands still here, until it is moved"
+                    )
         self.ties = list(self._ties())
         self.trees = list(self._trees())
         for tree in self.trees:
@@ -133,7 +135,9 @@ class Structure:
         local = vector(joint, f"physics:localPos{side}", (0.0, 0.0, 0.0)) * self.space.metres
         turn = quaternion(joint, f"physics:localRot{side}")
         if len(targets) > 1:
-            raise AssetError(f"{self.path}: {where} has {len(targets)} bodies at one end, {listing(map(str, targets), 4)}")
+            raise AssetError(
+                f"{self.path}: {where} has {len(targets)} bodies at one end, {listing(map(str, targets), 4)}"
+            )
         if not targets:
             return BASE, P.compose(self.space.up, np_pose(local, turn))
         prim = self.stage.GetPrimAtPath(targets[0])
@@ -234,7 +238,7 @@ class Structure:
         return next((path for path in members if path not in carried), members[0])
 
     def _holder(self, members: list[str]) -> str:
-        """What a tree is: the component of the stage that holds it, else the innermost prim that does, and no other."""
+        """What a tree is: the component of the stage that holds it, else the innermost prim that does."""
         split = [path.split("/") for path in members]
         common = [level[0] for level in zip(*split, strict=False) if len(set(level)) == 1]
         for depth in range(len(common), 1, -1):
@@ -257,8 +261,8 @@ class Structure:
             if len(self.trees) > 1:
                 names = [self._short(tree) for tree in self.trees]
                 raise AssetError(
-                    f"{self.path}: holds {len(names)} trees of bodies, {listing(names, 6)}; name the one that is meant: "
-                    f"{self.path.name}#{names[0]}"
+                    f"{self.path}: holds {len(names)} trees of bodies, {listing(names, 6)}; name the one that is "
+                    f"meant: {self.path.name}#{names[0]}"
                 )
             return self.trees[0] if self.trees else None
         found = [tree for tree in self.trees if name in self.names_of(tree)]
@@ -312,8 +316,3 @@ def unique(names: dict[str, str]) -> dict[str, str]:
             before = path.strip("/").split("/")[:-1]
             found[path] = "_".join([*before[-depth:], names[path]]) if depth <= len(before) else found[path]
     return {path: f"{name}_{i}" for i, (path, name) in enumerate(found.items())}
-
-
-def joined(names: Iterable[str]) -> str:
-    """Names in one line."""
-    return listing(list(names), 4)

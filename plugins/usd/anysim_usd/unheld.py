@@ -1,6 +1,6 @@
 """Notes of what a stage says and the neutral model does not hold.
 
-`anysim_usd.coverage` has the fate of each type, schema and attribute; one that is left out, or not in the table, is noted.
+`anysim_usd.coverage` has the fate of each type, schema and attribute; one that is left out, or not in it, is noted.
 """
 
 from collections.abc import Iterable, Iterator, Mapping

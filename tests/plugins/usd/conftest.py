@@ -43,9 +43,7 @@ def body(name: str, inside: str = "", mass: float = 1.0, at: str = "(0, 0, 0)", 
 def joint(name: str, kind: str, first: str, second: str, inside: str = "", schemas: str = "") -> str:
     """A joint between two prims of the world; an empty one is the world itself."""
     applied = f" (prepend apiSchemas = [{schemas}])" if schemas else ""
-    ends = "\n".join(
-        f"rel physics:body{i} = </World/{end}>" for i, end in enumerate((first, second)) if end
-    )
+    ends = "\n".join(f"rel physics:body{i} = </World/{end}>" for i, end in enumerate((first, second)) if end)
     return f'def Physics{kind}Joint "{name}"{applied} {{\n{ends}\n{inside}\n}}\n'
 
 

@@ -1,4 +1,4 @@
-"""What USD files say is read or noted: each row of the importer's table, in a model, in a world or in a report."""
+"""Rows of the table of USD files: each is found in a model, in a world or in a report."""
 
 import re
 from collections.abc import Iterator
@@ -34,7 +34,9 @@ def given(prim: Any, name: str) -> Any:
     usual = attribute.Get()
     if usual is None:
         usual = {"bool": False, "token": "", "vector3f[]": Vt.Vec3fArray()}.get(str(attribute.GetTypeName()), 0.0)
-    attribute.Set(type(usual)(1) if hasattr(usual, "__len__") and len(usual) == 0 and usual != "" else other(usual, name))
+    attribute.Set(
+        type(usual)(1) if hasattr(usual, "__len__") and len(usual) == 0 and usual != "" else other(usual, name)
+    )
 
 
 def other(value: Any, name: str = "") -> Any:

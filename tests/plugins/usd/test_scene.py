@@ -1,4 +1,4 @@
-"""Whole USD files as worlds: trees as objects at their places, lights, cameras, gravity, the ground, and what is left out."""
+"""Whole USD files as worlds: trees as objects at their places, lights, cameras, gravity and the ground."""
 
 from pathlib import Path
 
@@ -16,8 +16,9 @@ from tests.plugins.usd.conftest import HEAD, body, joint, world
 
 CUBE = 'def Cube "c" (prepend apiSchemas = ["PhysicsCollisionAPI"]) {\ndouble size = 0.2\n}\n'
 ROOM = world(
-    'def PhysicsScene "s" (prepend apiSchemas = ["PhysxSceneAPI"]) {\nvector3f physics:gravityDirection = (0, 0, -1)\n'
-    "float physics:gravityMagnitude = 3.7\nuint physxScene:timeStepsPerSecond = 250\nbool physxScene:enableCCD = true\n}",
+    'def PhysicsScene "s" (prepend apiSchemas = ["PhysxSceneAPI"]) {'
+    "\nvector3f physics:gravityDirection = (0, 0, -1)\nfloat physics:gravityMagnitude = 3.7"
+    "\nuint physxScene:timeStepsPerSecond = 250\nbool physxScene:enableCCD = true\n}",
     'def Plane "floor" (prepend apiSchemas = ["PhysicsCollisionAPI"]) {\nuniform token axis = "Z"\n}',
     'def Cube "wall" (prepend apiSchemas = ["PhysicsCollisionAPI"]) {\ndouble3 xformOp:translate = (0, 5, 0.5)\n'
     'uniform token[] xformOpOrder = ["xformOp:translate"]\ndouble size = 1\n}',
@@ -28,7 +29,8 @@ ROOM = world(
     joint("fixed", "Fixed", "", "case", "point3f physics:localPos0 = (0, 1, 0.1)"),
     'def DistantLight "sun" {\nfloat inputs:intensity = 3000\n}',
     'def DomeLight "sky" {\n}',
-    'def Camera "eye" {\ndouble3 xformOp:translate = (0, 0, 3)\nuniform token[] xformOpOrder = ["xformOp:translate"]\n}',
+    'def Camera "eye" {\ndouble3 xformOp:translate = (0, 0, 3)'
+    '\nuniform token[] xformOpOrder = ["xformOp:translate"]\n}',
 )
 
 
@@ -68,7 +70,10 @@ def test_what_is_left_out_is_noted(room: World) -> None:
 
 def test_y_up_and_centimetres_are_turned_and_scaled(tmp_path: Path) -> None:
     head = HEAD.replace('"Z"', '"Y"').replace("metersPerUnit = 1", "metersPerUnit = 0.01")
-    text = world(body("cup", CUBE, at="(100, 20, 0)"), 'def Plane "floor" (prepend apiSchemas = ["PhysicsCollisionAPI"]) {\nuniform token axis = "Y"\n}')
+    text = world(
+        body("cup", CUBE, at="(100, 20, 0)"),
+        'def Plane "floor" (prepend apiSchemas = ["PhysicsCollisionAPI"]) {\nuniform token axis = "Y"\n}',
+    )
     found = compile_world({"world": {"source": write(tmp_path, text, head)}})
     assert np.allclose(found.initial_body_pose[0], (1, 0, 0.2, 0, 0, 0, 1), atol=1e-12)
     assert found.physics.gravity == (0.0, 0.0, -9.81)

@@ -47,11 +47,18 @@ def test_masses_are_in_the_stage_s_unit_and_scaled_with_its_size(usd: Usd) -> No
 
 def test_what_has_y_up_stands_upright(usd: Usd) -> None:
     head = HEAD.replace('"Z"', '"Y"')
-    tall = 'def Capsule "c" (prepend apiSchemas = ["PhysicsCollisionAPI"]) { uniform token axis = "Y"\ndouble height = 3\n}'
+    tall = (
+        'def Capsule "c" (prepend apiSchemas = ["PhysicsCollisionAPI"]) { uniform token axis = "Y"\ndouble height = 3}'
+    )
     model = usd(world(body("a", tall)), head=head)
     up = P.rotate(np.array(model.geoms[0].quaternion), np.array([0.0, 0.0, 1.0]))
     assert abs(abs(up[2]) - 1.0) < 1e-12
-    turned = usd(world(body("a"), body("b", at="(0, 1, 0)"), joint("j", "Fixed", "a", "b", "point3f physics:localPos0 = (0, 1, 0)")), head=head)
+    turned = usd(
+        world(
+            body("a"), body("b", at="(0, 1, 0)"), joint("j", "Fixed", "a", "b", "point3f physics:localPos0 = (0, 1, 0)")
+        ),
+        head=head,
+    )
     assert np.allclose(turned.sites[0].position, (0, 0, 1), atol=1e-12)
 
 
@@ -66,7 +73,7 @@ def test_a_fixed_joint_to_the_world_makes_a_root_stand(usd: Usd) -> None:
 
 
 def test_a_slide_to_the_world_gets_a_base(usd: Usd) -> None:
-    limits = "float physics:lowerLimit = -1\nfloat physics:upperLimit = 2\nuniform token physics:axis = \"Y\""
+    limits = 'float physics:lowerLimit = -1\nfloat physics:upperLimit = 2\nuniform token physics:axis = "Y"'
     model = usd(world(body("cart", at="(0, 0.5, 0)"), joint("rail", "Prismatic", "", "cart", limits)))
     assert [one.name for one in model.bodies] == ["base", "cart"]
     rail = model.joints[0]
@@ -150,7 +157,8 @@ def test_angles_are_radians_and_gains_are_of_them(usd: Usd) -> None:
 
 def test_a_slide_in_centimetres_has_forces_in_newton(usd: Usd) -> None:
     """A force of a stage is in kilogram centimetres per second squared."""
-    drive = "float physics:upperLimit = 20\nfloat drive:linear:physics:maxForce = 500\nfloat drive:linear:physics:stiffness = 3"
+    drive = "float physics:upperLimit = 20\nfloat drive:linear:physics:maxForce = 500"
+    drive += "\nfloat drive:linear:physics:stiffness = 3"
     text = joint("j", "Prismatic", "a", "b", drive, '"PhysicsDriveAPI:linear"')
     model = usd(world(body("a"), body("b"), text), head=HEAD.replace("metersPerUnit = 1", "metersPerUnit = 0.01"))
     assert model.joints[0].upper == pytest.approx(0.2, rel=1e-12)
@@ -168,7 +176,8 @@ def test_where_bodies_stand_is_where_a_joint_is_at_first(usd: Usd) -> None:
 
 
 def test_a_ball_joint_becomes_three_hinges(usd: Usd) -> None:
-    cone = "float physics:coneAngle0Limit = 30\npoint3f physics:localPos0 = (0, 0, 1)\npoint3f physics:localPos1 = (0, 0, -1)"
+    cone = "float physics:coneAngle0Limit = 30\npoint3f physics:localPos0 = (0, 0, 1)"
+    cone += "\npoint3f physics:localPos1 = (0, 0, -1)"
     model = usd(world(body("a"), body("b", at="(0, 0, 2)"), joint("ball", "Spherical", "a", "b", cone)))
     assert [one.name for one in model.joints] == ["ball.roll", "ball.pitch", "ball.yaw"]
     assert model.bodies[1].position == (0.0, 0.0, 1.0)
@@ -193,7 +202,8 @@ def test_joints_between_the_same_bodies_move_one_after_another(usd: Usd) -> None
     """As MuJoCo writes a body with two hinges: about z first, and about the x that has turned with it."""
     ends = "point3f physics:localPos0 = (0, 0, 1)\npoint3f physics:localPos1 = (0, 0.5, 0)\n"
     hinges = [
-        joint(name, "Revolute", "a", "b", f'{ends}uniform token physics:axis = "{axis}"') for name, axis in (("z", "Z"), ("x", "X"))
+        joint(name, "Revolute", "a", "b", f'{ends}uniform token physics:axis = "{axis}"')
+        for name, axis in (("z", "Z"), ("x", "X"))
     ]
     model = usd(world(body("a"), body("b", at="(0, -0.5, 1)"), *hinges))
     assert [one.name for one in model.joints] == ["z", "x"]
@@ -211,7 +221,10 @@ def test_joints_between_the_same_bodies_move_one_after_another(usd: Usd) -> None
             "rel physxMimicJoint:rotX:referenceJoint = </World/j>\nfloat physxMimicJoint:rotX:gearing = -2\n"
             "float physxMimicJoint:rotX:offset = -30",
         ),
-        ('"NewtonMimicAPI"', "rel newton:mimicJoint = </World/j>\nfloat newton:mimicCoef1 = 2\nfloat newton:mimicCoef0 = 30"),
+        (
+            '"NewtonMimicAPI"',
+            "rel newton:mimicJoint = </World/j>\nfloat newton:mimicCoef1 = 2\nfloat newton:mimicCoef0 = 30",
+        ),
         (
             '"MjcEqualityJointAPI"',
             "rel mjc:target = </World/j>\ndouble mjc:coef1 = 2\ndouble mjc:coef0 = 0.5235987755982988",
@@ -265,11 +278,7 @@ def test_an_impossible_inertia_is_repaired(usd: Usd) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "shape"),
-    [
-        ('Sphere "s"', Sphere(0.5)),
-        ('Cylinder "s"', Cylinder(0.5, 1.5)),
-        ('Capsule "s"', Capsule(0.5, 1.5)),
-    ],
+    [('Sphere "s"', Sphere(0.5)), ('Cylinder "s"', Cylinder(0.5, 1.5)), ('Capsule "s"', Capsule(0.5, 1.5))],
 )
 def test_solids_are_as_they_are(usd: Usd, kind: str, shape: object) -> None:
     size = "double radius = 0.5" + ("" if "Sphere" in kind else '\ndouble height = 3\nuniform token axis = "X"')
@@ -307,7 +316,10 @@ def test_meshes_collide_as_their_file_says_or_a_note_tells(usd: Usd) -> None:
     assert not any("collides" in one for one in words(hull))
     assert [geom.collides for geom in hull.geoms] == [True, False]
     for kind in ("convexDecomposition", "sdf"):
-        assert any(f"collides as {kind} in its file, here as its" in one for one in words(usd(world(body("a", L_SHAPE % (kind, ""))))))
+        assert any(
+            f"collides as {kind} in its file, here as its" in one
+            for one in words(usd(world(body("a", L_SHAPE % (kind, "")))))
+        )
     assert any("collides by each triangle" in one for one in words(usd(world(body("a", L_SHAPE % ("none", ""))))))
     cube = usd(world(body("a", L_SHAPE % ("boundingCube", "")))).geoms[0]
     assert (cube.shape, cube.position) == (Box((1.0, 1.0, 0.5)), (1.0, 1.0, 0.5))
@@ -372,22 +384,45 @@ def test_subsets_of_a_mesh_have_their_colours(usd: Usd) -> None:
 # ------------------------------------------------------------------ composition
 
 
+TWO_SIZES = """def Xform "World" (
+    variants = { string size = "big" }
+    prepend variantSets = "size"
+) {
+    variantSet "size" = {
+        "big" {
+            def Cube "x" { double size = 4 }
+        }
+        "small" {
+            def Cube "x" { double size = 1 }
+        }
+    }
+    def Xform "a" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]) {
+        float physics:mass = 1
+        def Xform "l" (
+            instanceable = true
+            inherits = </_leg>
+        ) { }
+        def Xform "r" (
+            instanceable = true
+            inherits = </_leg>
+        ) { }
+    }
+}
+"""
+
+
 def test_instances_and_variants_are_unfolded(usd: Usd) -> None:
-    text = (
-        'class Xform "_leg" {\n' + (CUBE % "") + "\n}\n"
-        + world(
-            body("a", 'def Xform "l" (instanceable = true\ninherits = </_leg>) {\n}\ndef Xform "r" (instanceable = true\ninherits = </_leg>) {\n}'),
-        ).replace('def Xform "World" {', 'def Xform "World" (\nvariants = { string size = "big" }\nprepend variantSets = "size"\n) {\nvariantSet "size" = {\n"big" { def Cube "x" { double size = 4\n} }\n"small" { def Cube "x" { double size = 1\n} }\n}')
-    )
-    model = usd(text)
-    assert len(model.geoms) == 2
+    text = f'class Xform "_leg" {{\n{CUBE % ""}\n}}\n{TWO_SIZES}'
+    assert len(usd(text).geoms) == 2
     assert usd(text, body="/").geoms[0].shape == Box((2.0, 2.0, 2.0))
 
 
 def test_filters_keep_bodies_apart(usd: Usd) -> None:
     parts = [body(n, CUBE % "") for n in "abc"]
     joints = [joint("j", "Revolute", "a", "b"), joint("k", "Revolute", "b", "c")]
-    filtered = body("a", (CUBE % "") + "\nrel physics:filteredPairs = </World/c>", schemas=', "PhysicsFilteredPairsAPI"')
+    filtered = body(
+        "a", (CUBE % "") + "\nrel physics:filteredPairs = </World/c>", schemas=', "PhysicsFilteredPairsAPI"'
+    )
     assert usd(world(filtered, *parts[1:], *joints)).excluded_pairs == {(0, 2)}
     group = """def PhysicsCollisionGroup "g" (prepend apiSchemas = ["CollectionAPI:colliders"]) {
         rel collection:colliders:includes = [</World/a>, </World/c>]

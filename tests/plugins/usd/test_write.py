@@ -9,12 +9,11 @@ pytest.importorskip("pxr", reason="USD files are written by usd-core, which the 
 
 from anysim.api import compile_world
 from anysim.assets.load import import_asset
-from anysim.model.world import World
+from anysim.model.world import Geom, World
 from anysim_export_model.scene import scene_of_model, scene_of_world
 from anysim_export_model.write import write
 from tests.plugins.export_model.test_round_trip import FAST, LARGEST, SLOW, differences
 from tests.plugins.export_model.test_scene_round_trip import WORLD, numbers
-from anysim.model.world import Geom
 
 PARTS = ["bodies", "joints", "geoms", "sites", "lights", "cameras"]
 NAMED = [FAST[0], *(pytest.param(file, marks=pytest.mark.slow) for file in SLOW[:6:2])]
@@ -71,7 +70,9 @@ def test_a_world_is_the_same_after_a_file(pair: tuple[World, World], kind: str) 
         if isinstance(part, Geom) and np.dot(part.quaternion, back.quaternion) < 0:
             continue  # the same turn, with the other sign; its poses are compared with those of the bodies
         assert np.allclose(
-            *([v for v in numbers(p) if isinstance(v, float) and abs(v) < 1e300] for p in (part, back)), rtol=0, atol=1e-12
+            *([v for v in numbers(p) if isinstance(v, float) and abs(v) < 1e300] for p in (part, back)),
+            rtol=0,
+            atol=1e-12,
         ), part.name
 
 

@@ -38,7 +38,7 @@ from anysim_export_model.common import check_joint, looks, never_written, unknow
 from anysim_export_model.notes import Notes
 from anysim_export_model.scene import Piece, Scene
 from anysim_usd.library import pxr, quiet
-from anysim_usd.stage_writer import StageWriter
+from anysim_usd.writing.stage import StageWriter
 
 _LARGEST = 1e6  # [m] of a plane that has no end
 
@@ -105,16 +105,18 @@ class _UsdWriter:
             out.apply(prim, "MjcSiteAPI")
             out.place(prim, site.position, site.quaternion)
             out.exact(prim, "frame", (*site.position, *site.quaternion))
-        joints = out.define(base, "joints", "Scope") if model.joints or piece.root is not BodyKind.FREE else None
+        joints = ""
+        if model.joints or piece.root is not BodyKind.FREE:
+            joints = str(out.define(base, "joints", "Scope").GetPath())
         if piece.root is not BodyKind.FREE:
-            tie = out.define(str(joints.GetPath()), "root_joint", "PhysicsFixedJoint")
+            tie = out.define(joints, "root_joint", "PhysicsFixedJoint")
             self._ends(tie, "", paths[0], poses[0], P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
         if model.joints:
             out.apply(root, "PhysicsArticulationRootAPI")
         found: list[Any] = []
         for joint in model.joints:
             check_joint(joint, "USD")
-            found.append(self._joint(str(joints.GetPath()), joint, model.bodies[joint.body], paths))
+            found.append(self._joint(joints, joint, model.bodies[joint.body], paths))
         for joint, prim in zip(model.joints, found, strict=True):
             if joint.mimic is not None:
                 self._mimic(prim, joint, model.joints[joint.mimic.joint], found[joint.mimic.joint])
@@ -123,6 +125,10 @@ class _UsdWriter:
                 self.notes.lost("drive of a tendon", "is left out", model.joints[hint.joint].name)
             else:
                 self._drive(found[hint.joint], model.joints[hint.joint], hint)
+        driven = {hint.joint for hint in model.actuator_hints if not hint.shares}
+        for number, joint in enumerate(model.joints):
+            if number not in driven and joint.effort_limit != inf:
+                self._undriven(found[number], joint)
         for low, high in sorted(model.excluded_pairs):
             self._filter(paths[low], paths[high])
 
@@ -216,8 +222,6 @@ class _UsdWriter:
             out.single(prim, "physxJoint:maxJointVelocity", "velocityLimit", joint.velocity_limit, unit)
         if joint.armature:
             out.single(prim, "physxJoint:armature", "armature", joint.armature)
-        if joint.effort_limit != inf:
-            out.exact(prim, "effortLimit", joint.effort_limit)
         mjc = {"damping": joint.damping, "frictionloss": joint.friction, "stiffness": joint.stiffness}
         if any(mjc.values()):
             out.apply(prim, "MjcJointAPI")
@@ -254,6 +258,16 @@ class _UsdWriter:
         out.single(prim, f"drive:{kind}:physics:damping", "driveDamping", hint.kd, per)
         if hint.effort_limit != inf:
             out.single(prim, f"drive:{kind}:physics:maxForce", "driveLimit", hint.effort_limit)
+        if hint.effort_limit != joint.effort_limit:
+            out.exact(prim, "driveLimit", hint.effort_limit)
+            out.exact(prim, "effortLimit", joint.effort_limit)
+
+    def _undriven(self, prim: Any, joint: Joint) -> None:
+        """The effort limit of a joint without a drive is that of one that does nothing, as others have it."""
+        kind = "angular" if joint.type is JointType.REVOLUTE else "linear"
+        self.out.apply(prim, f"PhysicsDriveAPI:{kind}")
+        self.out.single(prim, f"drive:{kind}:physics:maxForce", "effortLimit", joint.effort_limit)
+        self.out.put(prim, "anysim:undriven", "Bool", True)
 
     # ------------------------------------------------------------------ shapes
 
@@ -284,7 +298,14 @@ class _UsdWriter:
 
     def _shape(self, base: str, geom: Geom, known: dict[str, Mesh]) -> Any:
         out, lib, shape = self.out, pxr(), geom.shape
-        kinds = {Box: "Cube", Sphere: "Sphere", Cylinder: "Cylinder", Capsule: "Capsule", Plane: "Plane", MeshShape: "Mesh"}
+        kinds = {
+            Box: "Cube",
+            Sphere: "Sphere",
+            Cylinder: "Cylinder",
+            Capsule: "Capsule",
+            Plane: "Plane",
+            MeshShape: "Mesh",
+        }
         if type(shape) not in kinds:
             self.notes.lost("height field", "is left out: USD has no such shape", geom.name)
             return None
@@ -308,7 +329,9 @@ class _UsdWriter:
                 mesh = known[name]
                 faces = np.asarray(mesh.faces, dtype=np.int32)
                 made = lib.UsdGeom.Mesh(prim)
-                made.CreatePointsAttr(lib.Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.vertices, dtype=np.float32)))
+                made.CreatePointsAttr(
+                    lib.Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.vertices, dtype=np.float32))
+                )
                 made.CreateFaceVertexCountsAttr([3] * len(faces))
                 made.CreateFaceVertexIndicesAttr(lib.Vt.IntArray.FromNumpy(np.ascontiguousarray(faces.ravel())))
                 made.CreateSubdivisionSchemeAttr("none")
@@ -322,10 +345,18 @@ class _UsdWriter:
         if surface == ORDINARY:
             return
         usual = Surface()
-        key = (surface.friction, surface.restitution, surface.torsional_friction, surface.rolling_friction, surface.torsional)
+        key = (
+            surface.friction,
+            surface.restitution,
+            surface.torsional_friction,
+            surface.rolling_friction,
+            surface.torsional,
+        )
         if key[:2] != (usual.friction, usual.restitution) or key[2:] != (
-            usual.torsional_friction, usual.rolling_friction, usual.torsional,
-        ):  # fmt: skip
+            usual.torsional_friction,
+            usual.rolling_friction,
+            usual.torsional,
+        ):
             if key not in self.materials:
                 self.materials[key] = self._material(surface)
             shade = pxr().UsdShade
@@ -334,7 +365,12 @@ class _UsdWriter:
         if surface.contact_offset is not None:
             self.out.apply(prim, "PhysxCollisionAPI")
             self.out.put(prim, "physxCollision:contactOffset", "Float", surface.contact_offset)
-        if surface.softness or surface.impedance != usual.impedance or surface.compliance is not None or surface.priority:
+        if (
+            surface.softness
+            or surface.impedance != usual.impedance
+            or surface.compliance is not None
+            or surface.priority
+        ):
             self.notes.lost("softness of a contact", "is left out: solvers are the engine's", name)
 
     def _material(self, surface: Surface) -> str:

@@ -61,7 +61,9 @@ class StageWriter:
         if exact and again != float(value):
             self.exact(prim, exact, value)
 
-    def place(self, prim: Any, position: Iterable[float], quaternion: Iterable[float], size: Array | None = None) -> None:
+    def place(
+        self, prim: Any, position: Iterable[float], quaternion: Iterable[float], size: Array | None = None
+    ) -> None:
         """Where a prim is, in double precision; and how it is stretched."""
         lib = pxr()
         xyz, (x, y, z, w) = [float(v) for v in position], [float(v) for v in quaternion]
