@@ -9,13 +9,10 @@ OTHERS = ("pybullet", "sapien")
 ENGINES = ("mujoco", *OTHERS)
 
 
-def by_turns(names: Iterable[str], long: Collection[str] = ()) -> list[Any]:
-    """Parameters (name, engine): slow on MuJoCo and, by turns, one other engine; full on the rest.
-
-    Those that take long are slow on MuJoCo alone.
-    """
+def by_turns(names: Iterable[str]) -> list[Any]:
+    """Parameters (name, engine): slow on MuJoCo and, by turns, one other engine; full on the rest."""
     return [
-        _tiered(name, engine, engine == "mujoco" or (name not in long and engine == OTHERS[number % 2]))
+        _tiered(name, engine, engine in ("mujoco", OTHERS[number % 2]))
         for number, name in enumerate(names)
         for engine in ENGINES
     ]
