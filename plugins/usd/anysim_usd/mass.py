@@ -1,7 +1,8 @@
 """Masses and inertias of bodies: what UsdPhysics says of them, and what it leaves to the shapes that collide.
 
-A mass that is not given is that of the shapes: their own masses, or their densities, which the shape or the next prim
-above it says, up to the body, else its material, else 1000 kg/m^3. What else is not given of centre and inertia is theirs as well.
+A mass that is not given is that of the shapes: their own masses, or their densities, which the shape or the next
+prim above it says, up to the body, else its material, else 1000 kg/m^3. What else is not given of centre and inertia
+is theirs as well.
 """
 
 from collections.abc import Sequence
