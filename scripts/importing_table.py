@@ -110,13 +110,14 @@ def package_of(uri: str) -> str:
 
 
 def _failed(row: dict[str, Any]) -> dict[str, str]:
-    """By reason the engines that have it."""
+    """By reason the engines that have it, with how far it moved [rad, m] or its frames are off [m]."""
     found: dict[str, list[str]] = {}
     for engine, one in row.get("engines", {}).items():
         for check, why in one["why"].items():
-            figure = f" {one['moved']:g}" if check == "hold" and "moved" in one else ""
-            words = cell(why)
-            found.setdefault(f"**{check}**{figure if len(row['engines']) == 1 else ''}: {words}", []).append(engine)
+            figure = one.get({"hold": "moved", "kinematics": "frames"}.get(check, ""))
+            found.setdefault(f"**{check}**: {cell(why)}", []).append(
+                engine if figure is None else f"{engine} {figure:g}"
+            )
     return {why: ", ".join(engines) for why, engines in found.items()}
 
 

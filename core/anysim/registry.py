@@ -42,6 +42,7 @@ KINDS: Mapping[str, str] = {
     "model_writers": "writers of models as files of other programs, by file format",
     "oracles": "independent readers of robots that importers are held against, by file format",
     "assets": "builders of procedural assets",
+    "colliders": "makers of collision geometry from meshes, other than their hulls",
     "layouts": "proposers of layouts",
     "rooms": "builders of rooms",
     "terrains": "builders of generated ground",
@@ -77,6 +78,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     },
     "anysim-client": {"clients": "http https"},
     "anysim-collect": {"commands": "counterfactual report run"},
+    "anysim-colliders": {"colliders": "decompose mesh primitives"},
     "anysim-control": {
         "controllers": "ackermann_drive batched_ik differential_drive differential_ik"
         " gripper_multi_finger holonomic_drive mink_ik operational_space pd pink_ik planar_drive",

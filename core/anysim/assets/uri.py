@@ -108,7 +108,7 @@ def _parts(what: str, uri: str) -> tuple[str, str]:
 
 def _folder_inside(root: Path, rest: str, uri: str) -> AssetFile:
     root = root.resolve()
-    resolved = (root / rest).resolve()
+    resolved = _resolved(root / rest, f"folder '{uri}'")
     if not resolved.is_relative_to(root):
         raise AssetError(f"folder '{uri}' leaves its root {root}: it would be {resolved}")
     if not resolved.is_dir():
@@ -231,10 +231,17 @@ def _package_name(folder: Path) -> str:
     return named[1].decode() if named else ""
 
 
+def _resolved(path: Path, what: str) -> Path:
+    try:
+        return path.resolve()
+    except (RuntimeError, OSError) as error:  # of Python before 3.13: a loop of symbolic links
+        raise AssetError(f"{what} cannot be found: {error}") from error
+
+
 def _inside(root: Path, rest: str, uri: str) -> AssetFile:
     root = root.resolve()
     path = root / rest
-    resolved = path.resolve()
+    resolved = _resolved(path, f"asset '{uri}'")
     if not resolved.is_relative_to(root):
         how = "through '..'" if ".." in Path(rest).parts else "through a symbolic link or an absolute path"
         raise AssetError(f"asset '{uri}' leaves its root {root} {how}: it would be {resolved}")

@@ -148,6 +148,7 @@ class _UsdImport:
             geom_links=tuple(self.shapes.geom_links),
             sites=tuple(self.sites),
             meshes=tuple(self.shapes.meshes.values()),
+            wholes=self.shapes.wholes,
             links=self.links,
             actuator_hints=tuple(self.hints),
             excluded_pairs=excluded,

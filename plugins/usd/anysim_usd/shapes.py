@@ -7,8 +7,8 @@ import numpy as np
 
 from anysim import cache
 from anysim.assets.bounded_files import check
-from anysim.assets.meshes import hull_of, light_mesh
-from anysim.assets.model import ImportNote
+from anysim.assets.meshes import hull_of, light_mesh, whole_read
+from anysim.assets.model import ImportNote, WholeMesh
 from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.geometry.triangles import triangles, turned
@@ -52,6 +52,7 @@ class ShapeReader:
         self.geoms: list[Geom] = []
         self.geom_links: list[str] = []
         self.meshes: dict[str, Mesh] = {}
+        self.wholes: dict[str, WholeMesh] = {}
         self.prims: dict[str, list[str]] = {}
         """The geoms of each prim, by its path."""
         self._count: dict[tuple[str, str], int] = {}
@@ -126,8 +127,11 @@ class ShapeReader:
 
     def _hulled(self, prim: Any, solid: Solid, frame: Array) -> tuple[Shape, Array]:
         vertices = _into(solid.pose, solid.vertices)
-        mesh = hull_of(prim.GetName(), vertices, cache.digest(vertices.tobytes()))
-        return MeshShape(self._keep(mesh)), P.compose(P.inverse(frame), solid.pose)
+        faces, name = np.asarray(solid.faces, dtype=np.int32), prim.GetName()
+        source = cache.digest(vertices.tobytes(), faces.tobytes())
+        shape = MeshShape(self._keep(hull_of(name, vertices, source)))
+        self.wholes[shape.mesh] = whole_read(name, vertices, faces, source)
+        return shape, P.compose(P.inverse(frame), solid.pose)
 
     def _keep(self, mesh: Mesh) -> str:
         name = f"{mesh.name}_{mesh.hash[:8]}"

@@ -5,11 +5,14 @@ from math import inf, pi, radians
 import numpy as np
 import pytest
 
+from anysim.assets.collision_shapes import with_collision
 from anysim.assets.model import ImportedModel
 from anysim.errors import AssetError
 from anysim.kinematics import inertia
+from anysim.kinematics.inertia import volume
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, Box, Capsule, ControlMode, Cylinder, JointType, MeshShape, Sphere
+from anysim_schemas.collision_shapes import CollisionShapesSpec
 from tests.plugins.usd.conftest import HEAD, Usd, body, joint, world
 
 CUBE = 'def Cube "c" (prepend apiSchemas = ["PhysicsCollisionAPI"]) { double size = 2\n%s }'
@@ -330,6 +333,17 @@ def test_meshes_collide_as_their_file_says_or_a_note_tells(usd: Usd) -> None:
     assert (cube.shape, cube.position) == (Box((1.0, 1.0, 0.5)), (1.0, 1.0, 0.5))
     ball = usd(world(body("a", L_SHAPE % ("boundingSphere", "")))).geoms[0]
     assert ball.shape == Sphere(pytest.approx(1.5))
+
+
+def test_a_mesh_can_collide_in_convex_pieces(usd: Usd) -> None:
+    pytest.importorskip("coacd", reason="meshes are decomposed by CoACD, which the dependency group `test` has")
+    model = usd(world(body("a", L_SHAPE % ("convexDecomposition", ""))))
+    assert [whole.volume for whole in model.wholes.values()] == [pytest.approx(3.0)]
+    found = with_collision(model, CollisionShapesSpec(method="decompose"))
+    meshes = {mesh.name: mesh for mesh in found.meshes}
+    pieces = [volume(geom.shape, meshes) for geom in found.geoms if geom.collides]
+    assert len(pieces) > 1
+    assert sum(pieces) == pytest.approx(3.0, rel=0.02)
 
 
 def test_a_mesh_that_is_damaged_is_refused(usd: Usd) -> None:
