@@ -1,7 +1,8 @@
 """Masses and inertias of bodies: what UsdPhysics says of them, and what it leaves to the shapes that collide.
 
-A mass that is not given is that of the shapes: their own masses, or their densities, which the nearest of shape,
-material and body says, else 1000 kg/m^3. What else is not given of centre and inertia is theirs as well.
+A mass that is not given is that of the shapes: their own masses, or their densities, which the shape or the next
+prim above it says, up to the body, else its material, else 1000 kg/m^3. What else is not given of centre and inertia
+is theirs as well.
 """
 
 from collections.abc import Sequence
@@ -100,8 +101,17 @@ class MassReader:
         return inertia.moved(inertia.of_shape(shape, total, meshes), pose)
 
     def _density(self, prim: Any, body: Any) -> float:
-        """The density of a shape, in units of the file: its own, its material's, its body's, or that of water."""
-        for found in (given(prim, "physics:density"), self._looks.density(prim), given(body, "physics:density")):
-            if found:
+        """The density of a shape, in units of the file: the nearest that is said from it up to its body.
+
+        Its material's is the weakest, but for that of water.
+        """
+        here = prim
+        while here and not here.IsPseudoRoot():
+            if found := given(here, "physics:density"):
                 return found
+            if here == body:
+                break
+            here = here.GetParent()
+        if found := self._looks.density(prim):
+            return found
         return WATER * self._space.unit**3 / self._space.weight

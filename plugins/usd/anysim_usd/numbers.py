@@ -5,7 +5,7 @@ which is what was written where it had seven digits. What anysim itself writes h
 `anysim:NAME` beside it, which is believed as long as it says the same: another program may have changed the first.
 """
 
-from math import inf, isfinite, isinf
+from math import inf, isinf
 from typing import Any
 
 import numpy as np
@@ -109,11 +109,6 @@ def bound(value: float | None) -> float:
     if value is None or not value > 0 or isinf(value) or value >= 3.4e38:
         return inf
     return value
-
-
-def finite(value: float, otherwise: float) -> float:
-    """The number, or another where it is none."""
-    return value if isfinite(value) else otherwise
 
 
 def directions(prim: Any) -> list[tuple[str, float, float]]:

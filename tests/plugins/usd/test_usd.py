@@ -257,6 +257,11 @@ def test_a_mass_that_is_not_given_is_of_density_and_shapes(usd: Usd) -> None:
     assert any("says no mass; that of its shapes is 8000 kg" in one for one in words(water))
     wood = usd(world(bare % ("float physics:density = 500\n" + CUBE % "")))
     assert wood.bodies[0].inertial.mass == pytest.approx(4000.0)
+    light = 'def Material "m" (prepend apiSchemas = ["PhysicsMaterialAPI"]) {\nfloat physics:density = 10\n}'
+    bound = (CUBE % "rel material:binding:physics = </World/m>").replace('API"]', 'API", "MaterialBindingAPI"]')
+    assert usd(world(bare % bound, light)).bodies[0].inertial.mass == pytest.approx(80.0)
+    both = usd(world(bare % ("float physics:density = 500\n" + bound), light))
+    assert both.bodies[0].inertial.mass == pytest.approx(4000.0)  # a material's is the weakest
     own = (CUBE % "float physics:mass = 3").replace('PhysicsCollisionAPI"', 'PhysicsCollisionAPI", "PhysicsMassAPI"')
     assert usd(world(bare % own)).bodies[0].inertial.inertia[0] == pytest.approx(3 * 4 / 6)
     halves = 'def Cylinder "s" (prepend apiSchemas = ["PhysicsCollisionAPI"]) { double radius = 1\ndouble height = 1\n}'
