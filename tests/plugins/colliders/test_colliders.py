@@ -222,6 +222,17 @@ def test_open_triangles_have_no_volume(tmp_path: Path) -> None:
     assert told(world_of(tmp_path, file="drum.obj")) == ""
 
 
+def test_a_mesh_that_faces_inward_has_its_mass(tmp_path: Path) -> None:
+    """And is told as any other."""
+    file = l_part(tmp_path)
+    turned = [f"f {c} {b} {a}" for a, b, c in (_triangles(file)[1] + 1).tolist()]
+    corners = [line for line in file.read_text().splitlines() if line[0] == "v"]
+    file.write_text("\n".join([*corners, *turned]))
+    world = world_of(tmp_path, "primitives")
+    assert world.bodies[0].inertial.mass == pytest.approx(1000.0 * L_VOLUME)
+    assert "its hull +88.9%" in told(world)
+
+
 def test_links_that_the_entry_replaces_are_left_alone() -> None:
     spec = {"name": "r", "description": "d", "source": "r.urdf", "license": "MIT", "license_source": "x"}
     more = {"category": "arm", "channels": {}, "collision_shapes": "mesh"}
