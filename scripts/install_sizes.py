@@ -71,6 +71,7 @@ WORDS = {
     "tasks": "tasks on tables, with tight fits, hands, mobile bases and legs, with their experts",
     "teleop": "`anysim teleop`: demonstrations, driven by an input device",
     "urdf": "URDF files",
+    "usd": "USD files as robots, objects and worlds, and worlds as USD files: with usd-core",
     "viewer": "`anysim view`: tasks, worlds and recordings in a browser, on any engine; `anysim run --view`",
 }
 """What each extra brings; the table has a row for each."""

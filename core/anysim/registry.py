@@ -39,6 +39,7 @@ KINDS: Mapping[str, str] = {
     "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
     "scenes": "readers of whole scene files as worlds, by file format",
+    "model_writers": "writers of models as files of other programs, by file format",
     "oracles": "independent readers of robots that importers are held against, by file format",
     "assets": "builders of procedural assets",
     "colliders": "makers of collision geometry from meshes, other than their hulls",
@@ -112,6 +113,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},
     "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
     "anysim-urdf": {"importers": "sdf urdf world xacro", "scenes": "sdf world"},
+    "anysim-usd": {"importers": "usd usda usdc usdz", "model_writers": "usd", "scenes": "usd usda usdc usdz"},
     "anysim-viewer": {"commands": "view", "views": "page"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {

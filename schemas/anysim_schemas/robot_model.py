@@ -87,7 +87,7 @@ class LegSpec(Spec):
 class SensorPlaceSpec(Spec):
     """A place for a sensor on the robot: `cameras: {wrist: {mount: panda.camera}}`, `sensors: {imu: go2.body_imu}`."""
 
-    kind: Literal["camera", "depth", "imu", "force_torque", "lidar", "tactile"] = Field(
+    kind: Literal["camera", "depth", "imu", "force_torque", "lidar", "tactile", "touch", "tracking"] = Field(
         description="what belongs there"
     )
     link: str = Field(description="the link that carries it")

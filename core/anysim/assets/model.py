@@ -72,6 +72,20 @@ class ActuatorHint(NamedTuple):
         return self._replace(joint=joint(self.joint), shares=tuple((joint(j), ratio) for j, ratio in self.shares))
 
 
+class SensorHint(NamedTuple):
+    """A sensor that the source declares, for a draft of a catalogue entry and for scenes: an asset alone has none.
+
+    `kind` is that of an installed sensor, `frame` a link or a site, `params` are its others, `sources` the names of the
+    sensors of the source that it stands for.
+    """
+
+    name: str
+    kind: str
+    frame: str
+    params: Mapping[str, Any]
+    sources: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class ImportedModel:
     """One kinematic tree. Names are local (`panda_hand`), indices are into the tuples of this model.
@@ -106,6 +120,7 @@ class ImportedModel:
     tendons: tuple[Tendon, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     spatial_tendons: tuple[SpatialTendon, ...] = ()
+    sensors: tuple[SensorHint, ...] = ()
     wholes: Mapping[str, WholeMesh] = field(default_factory=dict)
 
     def drive_of(self, joint: int) -> ActuatorHint | None:

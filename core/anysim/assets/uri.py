@@ -32,7 +32,7 @@ from anysim_schemas.limits import MODEL_BYTES
 
 EXAMPLE_ROBOT_DATA = "example-robot-data"
 SCHEMES = (EXAMPLE_ROBOT_DATA, "package", "robot_descriptions", "file")
-_MODEL_FOLDERS = frozenset({"urdf", "robots", "xml", "mjcf", "xacro"})
+_MODEL_FOLDERS = frozenset({"urdf", "robots", "xml", "mjcf", "xacro", "usd"})
 _SEARCHED = 5000  # files looked at for a near name in an error message
 Folders = dict[str, list[tuple[Path, Path]]]
 """Of packages by name: what no file of it may leave, and a folder where it may lie."""
@@ -298,7 +298,7 @@ def _folder_root(folder: Path) -> Path:
     """The root of an asset given by an absolute path.
 
     The nearest folder with a package.xml, else the file's own folder, or the one above where that is called urdf,
-    robots, xml, mjcf or xacro (meshes then lie in a folder beside it).
+    robots, xml, mjcf, xacro or usd (meshes then lie in a folder beside it).
     """
     for candidate in (folder, *folder.parents):
         if (candidate / "package.xml").is_file():
