@@ -20,6 +20,7 @@ from anysim.testing.audit import audit
 from anysim_colliders.balls import least_ball
 from anysim_colliders.decompose import pieces
 from anysim_colliders.primitives import primitive
+from anysim_robots.drafting.draft import draft
 from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import WorldSpec
 from tests.plugins.colliders.shapes import DRUM_VOLUME, HEIGHT, L_HULL, L_VOLUME, RADIUS, drum, l_part
@@ -199,6 +200,11 @@ _MJCF = """<mujoco><asset><mesh name="l" file="l.obj"/></asset><worldbody><body 
 <geom type="mesh" mesh="l" density="500"/></body></worldbody></mujoco>"""
 _SDF = """<sdf version="1.9"><model name="part"><link name="l"><collision name="c"><geometry><mesh>
 <uri>l.obj</uri></mesh></geometry></collision></link></model></sdf>"""
+
+
+def test_a_draft_of_a_robot_tells_of_its_hulls(folder: Path) -> None:
+    (folder / "door.urdf").write_text(_DOOR)
+    assert any("convex hulls with over 10% more volume" in note for note in draft(folder / "door.urdf").notes)
 
 
 @pytest.mark.parametrize(("file", "text"), [("door.urdf", _DOOR), ("part.xml", _MJCF), ("part.sdf", _SDF)])
