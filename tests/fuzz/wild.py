@@ -142,6 +142,7 @@ class Wild:
             finally:
                 self.opened.watching = False
                 opened, self.opened.seen = self.opened.seen, []
+                assert "repair the package" not in said, f"a reader failed: {said[:300]}"
                 assert SECRET not in said, "it tells what is in a file outside"
                 assert not opened, f"it opened {opened[:3]}"
 

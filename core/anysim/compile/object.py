@@ -175,7 +175,10 @@ def _model(
     massive = dict(meshes)
     if wholes and source.collision is not None and source.collision.method != "hull":
         for name, whole in wholes.items():  # the mass of what is there, if it is closed, and not of its hull
-            massive[name] = whole.mesh() if whole.volume > 0 else meshes[name]
+            mesh = whole.mesh()
+            outward = replace(mesh, faces=mesh.faces[:, ::-1])  # of one whose triangles face inward
+            closed = [{name: one} for one in (mesh, outward) if inertia.volume(MeshShape(name), {name: one}) > 0]
+            massive |= closed[0] if whole.volume > 0 and closed else {}
     body = Body("", BodyKind.FREE, inertial=_inertial(spec, solid, massive))
     if not spec.fixed and (problem := inertial_problem(body.inertial)):
         issues.add("mass" if spec.mass is not None else "density" if spec.density is not None else key, problem)

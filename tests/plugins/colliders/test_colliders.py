@@ -20,6 +20,7 @@ from anysim.testing.audit import audit
 from anysim_colliders.balls import least_ball
 from anysim_colliders.decompose import pieces
 from anysim_colliders.primitives import primitive
+from anysim_robots.drafting.draft import draft
 from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import WorldSpec
 from tests.plugins.colliders.shapes import DRUM_VOLUME, HEIGHT, L_HULL, L_VOLUME, RADIUS, drum, l_part
@@ -201,6 +202,11 @@ _SDF = """<sdf version="1.9"><model name="part"><link name="l"><collision name="
 <uri>l.obj</uri></mesh></geometry></collision></link></model></sdf>"""
 
 
+def test_a_draft_of_a_robot_tells_of_its_hulls(folder: Path) -> None:
+    (folder / "door.urdf").write_text(_DOOR)
+    assert any("convex hulls with over 10% more volume" in note for note in draft(folder / "door.urdf").notes)
+
+
 @pytest.mark.parametrize(("file", "text"), [("door.urdf", _DOOR), ("part.xml", _MJCF), ("part.sdf", _SDF)])
 def test_meshes_of_files_are_decomposed_too(folder: Path, file: str, text: str) -> None:
     """Of URDF, MJCF and SDF: masses stay, the hull is gone, and what is there without a choice tells of it."""
@@ -220,6 +226,17 @@ def test_open_triangles_have_no_volume(tmp_path: Path) -> None:
     drum(tmp_path, closed=False)
     assert "are not closed, so what they enclose is not known" in told(world_of(tmp_path, "primitives", "drum.obj"))
     assert told(world_of(tmp_path, file="drum.obj")) == ""
+
+
+def test_a_mesh_that_faces_inward_has_its_mass(tmp_path: Path) -> None:
+    """And is told as any other."""
+    file = l_part(tmp_path)
+    turned = [f"f {c} {b} {a}" for a, b, c in (_triangles(file)[1] + 1).tolist()]
+    corners = [line for line in file.read_text().splitlines() if line[0] == "v"]
+    file.write_text("\n".join([*corners, *turned]))
+    world = world_of(tmp_path, "primitives")
+    assert world.bodies[0].inertial.mass == pytest.approx(1000.0 * L_VOLUME)
+    assert "its hull +88.9%" in told(world)
 
 
 def test_links_that_the_entry_replaces_are_left_alone() -> None:
