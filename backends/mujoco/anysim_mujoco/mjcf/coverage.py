@@ -29,10 +29,10 @@ _LAWS = "a motor, position or velocity drive of one hinge or slide becomes a dri
 FIELDS: Mapping[str, tuple[Row, ...]] = {
     "body": (
         Row(_EXACT, f"{_POSE} mass ipos iquat ialt inertia fullinertia explicitinertial"),
-        Row(_EXACT, "mocap", "it is fixed, and its pose a part of each env's state, which may be written at any time"),
         Row(_ABOUT, "gravcomp", "all of the weight, or none below a half"),
         Row(_OUT, "userdata", _NUMBERS),
         Row(_OUT, "plugin", "it is MuJoCo's alone"),
+        Row(_IDLE, "mocap", "it is fixed as others without a joint, whose poses are states that may be written, too"),
         Row(_IDLE, "simple fuse sleep", "it is of how MuJoCo computes"),
     ),
     "joint": (
