@@ -139,13 +139,13 @@ class Structure:
                 f"{self.path}: {where} has {len(targets)} bodies at one end, {listing(map(str, targets), 4)}"
             )
         if not targets:
-            return BASE, P.compose(self.space.up, np_pose(local, turn))
+            return BASE, P.compose(self.space.up, P.pose(local, turn))
         prim = self.stage.GetPrimAtPath(targets[0])
         if not prim:
             raise AssetError(f"{self.path}: {where} refers to the body '{targets[0]}', which does not exist")
         place = self.space.of(prim)
         owner = self.owner.get(str(prim.GetPath()), BASE)
-        here = np_pose(place.point(local), P.multiply(place.pose[3:], turn))
+        here = P.pose(place.point(local), P.multiply(place.pose[3:], turn))
         return owner, here if owner == BASE else P.compose(P.inverse(self.parts[owner].frame), here)
 
     # ------------------------------------------------------------------ trees
@@ -289,12 +289,7 @@ class Structure:
         if tree.root == BASE:
             return IDENTITY
         frame = self.parts[tree.root].frame
-        return frame if self.space.upright else np_pose(frame[:3], IDENTITY[3:])
-
-
-def np_pose(position: Array, quaternion_: Array) -> Array:
-    """A pose (7,) of arrays."""
-    return P.pose(position, quaternion_)
+        return frame if self.space.upright else P.pose(frame[:3], IDENTITY[3:])
 
 
 def _called(prim: Any) -> str:
