@@ -40,13 +40,15 @@ def spill(env: TaskEnv, name: str, share: float) -> None:
     put_particles(env, name, places)
 
 
-def poured(to_tray: Callable[[TaskEnv, float], None]) -> Callable[[TaskEnv, float], None]:
-    """The cup on its way to the tray; there its contents lie in it, beads side by side, or water in layers."""
+def poured(
+    to_tray: Callable[[TaskEnv, float], None], name: str = "water", frame: str = "tray"
+) -> Callable[[TaskEnv, float], None]:
+    """The cup on its way to the tray; there its contents lie in it, beads side by side, or particles in layers."""
 
     def path(env: TaskEnv, share: float) -> None:
         to_tray(env, share)
         if share == 1.0 and env.families is not None:
-            lie_in(env, "water", "tray")
+            lie_in(env, name, frame)
         elif share == 1.0:
             for number, bead in enumerate(BEADS):
                 put(env, bead, offset(seen(env, "tray"), x=0.03 * number - 0.045, z=0.04))
