@@ -595,5 +595,6 @@ CASES: dict[str, Case] = {
     "cowork_place": Case(
         person.placed, [_shifted("red_cube", x=0.06), _shifted("blue_cube", z=0.05), _moving("red_cube")], ("touch",)
     ),
+    "route_cable": Case(matter.routed, [matter.straight, matter.cable_off_goal, matter.take_cable]),
     "scoop_sand": Case(_SCOOPED, [lambda env: matter.spill(env, "sand", 0.95)]),
 }
