@@ -12,6 +12,7 @@ from math import isinf, isnan
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
+from anysim.assets.meshes import WholeMesh
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.model.affordances import Affordance
 from anysim.model.frames import FixedFrame
@@ -71,6 +72,20 @@ class ActuatorHint(NamedTuple):
         return self._replace(joint=joint(self.joint), shares=tuple((joint(j), ratio) for j, ratio in self.shares))
 
 
+class SensorHint(NamedTuple):
+    """A sensor that the source declares, for a draft of a catalogue entry and for scenes: an asset alone has none.
+
+    `kind` is that of an installed sensor, `frame` a link or a site, `params` are its others, `sources` the names of the
+    sensors of the source that it stands for.
+    """
+
+    name: str
+    kind: str
+    frame: str
+    params: Mapping[str, Any]
+    sources: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class ImportedModel:
     """One kinematic tree. Names are local (`panda_hand`), indices are into the tuples of this model.
@@ -82,7 +97,8 @@ class ImportedModel:
       of the lumped link is a Site with the link's name. `links` maps every link name of the source, lumped or not, to
       its body, and `geom_links` tells for each geom the link it was on in the source.
     - Collision geoms have `collides` set; visual ones have `visible` set and do not collide. A mesh that collides holds
-      its convex hull. `meshes` have a `hash` of source bytes and processing, names unique within the model.
+      its convex hull, and `wholes` has what each hull was made of. `meshes` have a `hash` of source bytes and
+      processing, names unique within the model.
     - `mimic` inside joints, tendons, constraints, `excluded_pairs` and hints use local indices.
     """
 
@@ -104,6 +120,8 @@ class ImportedModel:
     tendons: tuple[Tendon, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     spatial_tendons: tuple[SpatialTendon, ...] = ()
+    sensors: tuple[SensorHint, ...] = ()
+    wholes: Mapping[str, WholeMesh] = field(default_factory=dict)
 
     def drive_of(self, joint: int) -> ActuatorHint | None:
         """The drive that the source declares for a joint; None where it declares none, or several."""

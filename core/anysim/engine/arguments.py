@@ -80,7 +80,7 @@ def roots_only(world: World, bodies: Array, with_twist: bool) -> None:
 def with_followers(
     world: World, joints: Array, position: Array | None, velocity: Array | None
 ) -> tuple[Array, Array | None, Array | None]:
-    """Add the mimic joints whose leaders are written, at the values they must have."""
+    """Add the mimic joints whose leaders are written, at the values they must have, and those that follow these."""
     chosen = {int(j): column for column, j in enumerate(joints)}
     extra = [
         (i, chosen[j.mimic.joint], j.mimic)
@@ -99,7 +99,7 @@ def with_followers(
         velocity = np.concatenate([velocity, velocity[:, columns] * rate], axis=1)
     if position is not None:
         position = np.concatenate([position, np.stack([m.position(position[:, c]) for _, c, m in extra], 1)], axis=1)
-    return all_joints, position, velocity
+    return with_followers(world, all_joints, position, velocity)
 
 
 def kept(engine: str, name: str, wanted: Array, got: Array) -> None:

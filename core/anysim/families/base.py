@@ -20,6 +20,7 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capability
 from anysim.errors import PluginError, listing
 from anysim.math import pose as P
+from anysim.model.appearance import Rgb, rgb
 from anysim.randomization.streams import Streams
 from anysim_schemas.base import Spec
 
@@ -72,6 +73,7 @@ class Family(ABC):
         needs: capabilities of the engine beyond those that its World needs.
         rate: whether it is asked at each physics step, or at each part of a control step that controllers make.
         drawn: whether it draws (`draw`) what engines do not: its matter.
+        tint: red, green and blue of its matter where its parameters have no `color`.
         memory: (N, …) by name, zero when an episode begins: the whole of what it knows.
         bounds: (low, high) of those arrays whose values something else is looked up by.
     """
@@ -80,6 +82,7 @@ class Family(ABC):
     needs: ClassVar[tuple[Capability, ...]] = ()
     rate: ClassVar[Literal["control", "physics"]] = "control"
     drawn: ClassVar[bool] = False
+    tint: ClassVar[Rgb] = (0.5, 0.5, 0.5)
 
     def __init__(self, setting: FamilySetting) -> None:
         self.setting, self.engine = setting, setting.engine
@@ -124,6 +127,12 @@ class Family(ABC):
     @abstractmethod
     def state(self, env_ids: Array) -> FamilyState:
         """What it looks like now."""
+
+    @property
+    def color(self) -> Rgb:
+        """Red, green and blue of its matter in images, each 0 to 1."""
+        said = getattr(self.setting.spec, "color", None)
+        return self.tint if said is None else rgb(said)
 
     def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
         """Draw its matter into images (n, H, W, …) as an engine has made them, where it is nearer than their `depth`.

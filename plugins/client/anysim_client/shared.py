@@ -83,8 +83,10 @@ class SharedSlots:
             os.close(descriptor)
 
     def slot(self) -> int | None:
-        """A slot that nobody reads any more; None if there is none."""
-        return self._free.pop() if self._free else None
+        """The first slot that nobody reads any more, likely still in a cache; None if there is none."""
+        first = min(self._free, default=None)
+        self._free.discard(first)  # pyright: ignore[reportArgumentType]
+        return first
 
     def release(self, slot: int) -> None:
         """The slot was not used."""

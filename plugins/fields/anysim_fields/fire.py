@@ -170,6 +170,10 @@ class Fire(Family):
     def recorded(self, env_ids: Array) -> Mapping[str, Array]:
         return {"power": self.power(env_ids), "tip": self.tip(env_ids), "middle": self.puffs.middle(env_ids)}
 
+    @property
+    def color(self) -> tuple[float, float, float]:
+        return self.fuel.base if self.fire.color is None else rgb(self.fire.color)
+
     def looks(self, env: int) -> tuple[Array, Array]:
         """Extinction (K,) [m^2] and colour (K, 3) of the puffs."""
         row = np.array([env])

@@ -159,11 +159,14 @@ class Flow(CoSolver):
         mass = np.array([self.mass(env) for env in env_ids.tolist()])
         return {"mass": mass, "middle": self.puffs.middle(env_ids), "received": self.received[env_ids]}
 
+    @property
+    def color(self) -> tuple[float, float, float]:
+        return LOOKS[self.flow.look][0] if self.flow.color is None else rgb(self.flow.color)
+
     def looks(self, env: int) -> tuple[Array, Array]:
         """Extinction (K,) [m^2] and colour (K, 3) of the puffs."""
-        color = LOOKS[self.flow.look][0] if self.flow.color is None else rgb(self.flow.color)
         amount = float(self._look["extinction"][env]) * self.puffs.mass[env] * self.puffs.fade(env)
-        return amount, np.tile(np.array(color, dtype=float), (len(amount), 1))
+        return amount, np.tile(np.array(self.color, dtype=float), (len(amount), 1))
 
     def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
         self.puffs.draw(env_ids, view, images, self.looks)

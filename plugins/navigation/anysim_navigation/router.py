@@ -257,7 +257,7 @@ class BaseRouter:
         path, aim = self.window.ahead(progress, pose, field, cell)
         gear = float(self._gear[env])
         if progress.recovering > 0:
-            aim, gear = _roomiest(field, cell), 0.0
+            aim, gear = _roomiest(field, cell, movers), 0.0
             path = aim[None]
         choice = self.window.choose(field, cell, path, aim, now, self.twist[env], movers, gear)
         self.twist[env] = choice.twist
@@ -296,10 +296,10 @@ def frame_pose(scene: SceneView, frame: Frame) -> Array:
     return P.compose(scene.engine.world.initial_body_pose[at.body], local)
 
 
-def _roomiest(field: Array, cell: float) -> Array:
-    """(2,) [m] the place at 0.35 m around the base that is furthest from everything."""
-    from anysim_navigation.kernels.window import distance_at
+def _roomiest(field: Array, cell: float, movers: Array) -> Array:
+    """(2,) [m] the place at 0.35 m around the base that is furthest from everything, and from where movers will be."""
+    from anysim_navigation.kernels.window import clearance
 
     turn = 2 * np.pi * np.arange(16) / 16
     places = 0.35 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    return places[int(np.argmax([distance_at(field, cell, x, y) for x, y in places]))]
+    return places[int(np.argmax([clearance(field, cell, np.zeros((1, 3)), movers, x, y, 0.0, 1.0) for x, y in places]))]

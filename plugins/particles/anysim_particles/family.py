@@ -15,7 +15,6 @@ from anysim.errors import SpecError, SpecIssue
 from anysim.families.base import FamilyPart, FamilySetting, FamilyState
 from anysim.families.cosolver import CoSolver, MetBodies, about_origin
 from anysim.math import pose as P
-from anysim.model.appearance import rgb
 from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
 from anysim_particles import skins
@@ -29,7 +28,6 @@ class Particles(CoSolver):
 
     drawn = True
     label: ClassVar[str]
-    color: ClassVar[tuple[float, float, float]]
     looks: ClassVar[float] = 1.0
     """How much larger than its matter a particle is drawn."""
     meets_skins: ClassVar[bool] = False
@@ -250,12 +248,11 @@ class Particles(CoSolver):
     def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
         from anysim_particles.draw import draw_spheres
 
-        color = self.color if self.matter.color is None else rgb(self.matter.color)
         for row, env in enumerate(env_ids.tolist()):
             draw_spheres(
                 self.x[env, : self.count[env]],
                 self.radius(self.matter) * self.looks,
-                color,
+                self.color,
                 self.setting.entities[0] + 1,
                 view,
                 row,

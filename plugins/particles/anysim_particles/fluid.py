@@ -14,7 +14,7 @@ class Fluid(Particles):
 
     spec = FluidSpec
     label = "liquid"
-    color = (0.15, 0.42, 0.75)
+    tint = (0.15, 0.42, 0.75)
     looks: ClassVar[float] = 1.25
     meets_skins: ClassVar[bool] = True
 

@@ -64,7 +64,7 @@ class Sand(Grains):
 
     spec = SandSpec
     label = "sand"
-    color = (0.78, 0.62, 0.38)
+    tint = (0.78, 0.62, 0.38)
 
     @classmethod
     def block(cls, spec: MatterSpec) -> Array:
@@ -85,7 +85,7 @@ class Rice(Grains):
 
     spec = RiceSpec
     label = "rice"
-    color = (0.93, 0.9, 0.8)
+    tint = (0.93, 0.9, 0.8)
 
     def __init__(self, setting: FamilySetting) -> None:
         super().__init__(setting)

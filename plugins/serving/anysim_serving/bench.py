@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -157,6 +158,7 @@ class Soak(NamedTuple):
 def soak(clients: int, seconds: float) -> Soak:
     """Clients, each with a session of its own, that step as fast as they are answered."""
     with _server("blocks", str(clients)) as said:
+        _visit(said, clients)  # has the service begin the threads that it keeps for work beside its loop
         threads_before = _status(said["process"], "Threads")
         errors: list[str] = []
         steps = [0] * clients
@@ -209,6 +211,20 @@ def soak(clients: int, seconds: float) -> Soak:
         total = float(sum(counted))
         fairness = total**2 / (clients * float(np.sum(np.square(counted)))) if total else 0.0
         return Soak(clients, took, counted, tuple(errors), fairness, memory, memory_end, left, max(threads_left, 0))
+
+
+def _visit(said: dict[str, Any], clients: int) -> None:
+    """Have all clients come at once, and leave again."""
+
+    def client(number: int) -> None:
+        with connect(said["address"], token=said["token"]) as env:
+            env.reset(seed=number)
+
+    with ThreadPoolExecutor(clients) as pool:
+        list(pool.map(client, range(clients)))
+    end = time.monotonic() + 10.0
+    while _sessions(said) and time.monotonic() < end:
+        time.sleep(0.1)
 
 
 def _sessions(said: dict[str, Any]) -> int:

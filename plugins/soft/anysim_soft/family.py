@@ -15,7 +15,6 @@ from anysim.errors import PluginError, SpecError, SpecIssue, listing
 from anysim.families.base import FamilyPart, FamilySetting, FamilyState
 from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
-from anysim.model.appearance import rgb
 from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
 from anysim_schemas.base import Spec
@@ -41,7 +40,6 @@ class Soft(CoSolver):
 
     drawn = True
     label: ClassVar[str]
-    tint: ClassVar[tuple[float, float, float]]
     drawn_keys: ClassVar[tuple[str, ...]] = ("drag", "friction")
 
     # ------------------------------------------------------------------ what kinds differ in
@@ -264,15 +262,11 @@ class Soft(CoSolver):
         """Momentum of the matter, its middle, and what it received: any difference of a point shows in them."""
         middle = self.x[env_ids].mean(axis=1)
         told = {"middle": middle, "momentum": self.momentum(env_ids), "received": self.received[env_ids]}
-        return told | ({"pads": self.pads.stage[env_ids].copy()} if len(self.pads) else {})
-
-    def color(self) -> tuple[float, float, float]:
-        """Red, green and blue in images."""
-        return self.tint if self.soft.color is None else rgb(self.soft.color)
+        return told | ({"pads": self.pads.stage[env_ids].astype(np.int8)} if len(self.pads) else {})
 
     def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
         from anysim_particles.draw import draw_triangles
 
         mark = self.setting.entities[0] + 1
         for row, env in enumerate(env_ids.tolist()):
-            draw_triangles(self.x[env], self.faces, self.color(), mark, view, row, images)
+            draw_triangles(self.x[env], self.faces, self.color, mark, view, row, images)

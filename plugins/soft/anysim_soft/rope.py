@@ -104,7 +104,7 @@ class Rope(Soft):
         finer = np.linspace(0.0, places[-1], BETWEEN * places[-1] + 1)
         for row, env in enumerate(env_ids.tolist()):
             points = np.stack([np.interp(finer, places, self.x[env, :, i]) for i in range(3)], axis=1)
-            draw_spheres(points, self.radius, self.color(), mark, view, row, images)
+            draw_spheres(points, self.radius, self.color, mark, view, row, images)
 
 
 def edges(dt: float, impedance: str = "") -> str:

@@ -10,8 +10,6 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.state import ContactPoints
-from anysim.families.base import Family
-from anysim.model.appearance import rgb
 from anysim.record.film import capture_of
 from anysim.task.env import TaskEnv
 from anysim_viewer.solids import Looks, built_looks
@@ -118,14 +116,8 @@ def matter_of(env: TaskEnv, i: int) -> dict[str, Matter]:
         there = state.fields.get("there")
         points = state.points[0] if there is None else state.points[0][there[0]]
         radius = float(state.radius.mean()) if len(state.radius) else 0.0
-        found[name] = Matter(np.asarray(points, dtype=np.float32), radius, state.faces, color_of(family))
+        found[name] = Matter(np.asarray(points, dtype=np.float32), radius, state.faces, np.array(family.color))
     return found
-
-
-def color_of(family: Family) -> Array:
-    """Red, green and blue of a family's matter: those of its parameters, else of its kind, else grey."""
-    said = getattr(family.setting.spec, "color", None) or getattr(family, "color", None) or "gray"
-    return np.array(rgb(said))
 
 
 def looks_of(engine: SimEngine, i: int) -> Looks:

@@ -14,7 +14,7 @@ from anysim.record.reader import TrajectoryReader
 from anysim_film.stage import FilmOrder, Stage, Staged
 from anysim_viewer.controls import Plots, Switches, Transport, Words, among
 from anysim_viewer.drawing import Drawing
-from anysim_viewer.moment import OVERVIEW, Matter, Moment, Selection, cameras_of, color_of, looks_of
+from anysim_viewer.moment import OVERVIEW, Matter, Moment, Selection, cameras_of, looks_of
 from anysim_viewer.page import Page
 from anysim_viewer.video import Video
 from anysim_viewer.view import View
@@ -222,8 +222,11 @@ def _matter(staged: Staged, reader: TrajectoryReader) -> dict[str, tuple[Array, 
             continue
         rows, made = reader.stream(name), families.family(family)
         radius = float(next(iter(info.about.get("radius", ())), 0.01))
-        none = np.zeros((0, 3), dtype=np.int32)
-        points = [Matter(np.asarray(value, dtype=np.float32), radius, none, color_of(made)) for value in rows.values]
+        faces, color = families.state(family).faces, np.array(made.color)
+        points = [
+            Matter(value, radius, faces[(faces < len(value)).all(axis=1)], color)
+            for value in (np.asarray(value, dtype=np.float32) for value in rows.values)
+        ]
         if points:
             found[family] = (np.asarray(rows.steps), points)
     return found

@@ -16,6 +16,7 @@ from anysim.testing.engines import require_engine
 from anysim_navigation.base_planner import PlannedBase
 from anysim_navigation.drive_bench import HARD, drive
 from anysim_navigation.movers import Movers, movers_of
+from anysim_navigation.router import _roomiest
 from tests.tiers import others
 
 BALL = {"source": {"box": [0.4, 0.4, 0.4]}}
@@ -68,6 +69,15 @@ def begun(env: TaskEnv) -> SkillPolicy:
     policy = SkillPolicy(env)
     policy.begin(np.array([0]))
     return policy
+
+
+def test_a_base_that_recovers_makes_for_where_no_mover_will_be() -> None:
+    """A wall 0.4 m behind: it makes for the front, where a person walks up to the side, out of the way."""
+    columns = 0.05 * (np.arange(61) - 30)
+    field = np.tile(np.clip(columns + 0.4, 0.0, None), (61, 1))
+    np.testing.assert_allclose(_roomiest(field, 0.05, np.zeros((0, 5))), [0.35, 0.0], atol=1e-9)
+    person = np.array([[1.0, 0.0, -0.6, 0.0, 0.3]])
+    assert abs(_roomiest(field, 0.05, person)[1]) > 0.3
 
 
 def test_people_and_other_robots_are_movers_where_none_are_named() -> None:

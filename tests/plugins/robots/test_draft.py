@@ -14,7 +14,7 @@ from anysim.errors import AssetError
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_robots.drafting.draft import draft
-from anysim_robots.drafting.gains import BANDWIDTH
+from anysim_robots.drafting.gains import BANDWIDTH, SAG, gains
 from anysim_robots.qualify.stage import stage
 
 ROOT = Path(__file__).parents[3]
@@ -57,6 +57,23 @@ def test_gains_are_critically_damped_at_the_stated_bandwidth() -> None:
         kp, kd, armature = made.gains[name]
         assert kd == pytest.approx(2 * kp / omega, rel=0.06)  # two digits
         assert armature == pytest.approx(kp / omega**2 / 11, rel=0.06)  # a tenth of the link's, of eleven tenths
+
+
+def test_gains_bear_weight_that_nothing_compensates_and_move_what_follows(tmp_path: Path) -> None:
+    """A rod held out by its end, and a follower of a follower on it that turns six times as far."""
+    (tmp_path / "rod.xml").write_text("""<mujoco><worldbody><body name="b"><geom size=".1" mass="1"/>
+      <body><joint name="lift" axis="0 1 0"/><inertial pos=".5 0 0" mass="1" diaginertia=".01 .01 .01"/>
+      <body pos="1 0 0"><joint name="turn" axis="0 0 1"/><inertial pos="0 0 0" mass=".1" diaginertia=".1 .1 .1"/>
+      <body><joint name="on" axis="0 0 1"/><inertial pos="0 0 0" mass=".1" diaginertia=".1 .1 .1"/></body></body></body>
+      </body></worldbody><equality><joint joint1="turn" joint2="lift" polycoef="0 2 0 0 0"/>
+      <joint joint1="on" joint2="turn" polycoef="0 3 0 0 0"/></equality></mujoco>""")
+    model = draft(tmp_path / "rod.xml").model
+    free, held = (gains(model, False, frozenset(), weighed)["lift"] for weighed in (False, True))
+    omega = 2 * np.pi * BANDWIDTH
+    about_y, about_z = 0.01 + 0.25 + 2 * (0.1 + 0.1), 2 * 2 * 0.2 + 6 * 6 * 0.1 + 2 * 2 * 6 * 0.1
+    assert free.kp == pytest.approx(1.1 * (about_y + about_z) * omega**2, rel=0.06)
+    weight = 9.81 * (0.5 + 0.2)
+    assert held.kp == pytest.approx(max(weight / SAG, free.kp), rel=0.06)
 
 
 def test_what_cannot_be_inferred_is_a_comment_of_the_file(tmp_path: Path) -> None:
@@ -203,6 +220,14 @@ def test_chains_at_the_corners_are_legs_and_not_fingers(tmp_path: Path, chains: 
     made = draft(tmp_path / "dog.xml")
     assert (made.guess.category, made.guess.floating, len(made.guess.legs)) == ("quadruped", True, chains)
     built(made, tmp_path)
+    whole = text.format("".join(leg.format(*place) for place in places))
+    (tmp_path / "ghost.xml").write_text(whole.replace("<geom", '<geom contype="0" conaffinity="0"'))
+    ghost = draft(tmp_path / "ghost.xml").guess
+    assert not ghost.floating
+    assert "base: fixed; nothing of it collides, and without collision shapes it would fall for ever" in ghost.reasons
+    sideways = "".join(leg.format(x, f"0 {y}").replace(' 0">', '">', 1) for x, y in places)
+    (tmp_path / "side.xml").write_text(text.format(sideways))
+    assert any("it lies on its side" in reason for reason in draft(tmp_path / "side.xml").guess.reasons)
     row = [(0.1, 0.03 * i) for i in range(3)] + [(-0.1, 0.0)]
     (tmp_path / "hand.xml").write_text(text.format("".join(leg.format(*place) for place in row)))
     assert draft(tmp_path / "hand.xml").guess.category == "hand"

@@ -9,15 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from anysim.api import load
 from anysim.assets.catalogue import load_robot, missing_source
+from anysim.compile.world import compile_with_report
 from anysim_processes.own_process import ProcessEnd
+from anysim_robots.drafting.draft import draft
 from anysim_robots.gallery.page import contact_sheets, page
 from anysim_robots.gallery.store import due, estimate, fingerprint, measure, read
 from anysim_robots.qualify import apart, motion, oracle, run
 from anysim_robots.qualify.apart import qualify_apart
+from anysim_robots.qualify.oracle import Urdf, oracle_of
 from anysim_robots.qualify.result import CHECKS, Check, Qualification, as_data, from_data
 from anysim_robots.qualify.run import Durations, qualify
 from anysim_robots.qualify.stage import stage
+from anysim_robots.qualify.statics import source_check
 
 ROOT = Path(__file__).parents[3]
 ARM = ROOT / "tests" / "external" / "anysim-thirdarm" / "anysim_thirdarm"
@@ -115,6 +120,37 @@ def test_another_reading_of_the_source_is_noticed(monkeypatch: pytest.MonkeyPatc
     assert told["kinematics"].words.startswith("palm")
     assert "6 in the source as another reads it" in told["source"].words
     assert "kg in the source" in told["source"].words
+
+
+def test_mass_that_an_importer_says_it_gave_is_no_fault(tmp_path: Path) -> None:
+    """Of a link without mass that carries 40 kg; a robot that is heavier by more than it says is one."""
+    inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    heavy = f'<link name="{{0}}"><inertial><mass value="{{1}}"/>{inertia}'
+    joint = '<joint name="{0}{1}" type="continuous"><parent link="{0}"/><child link="{1}"/><axis xyz="0 0 1"/></joint>'
+    parts = [heavy.format("a", 1), '<link name="b"/>', heavy.format("c", 40), joint.format(*"ab"), joint.format(*"bc")]
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{"".join(parts)}</robot>')
+    (tmp_path / "r.yaml").write_text(draft(tmp_path / "r.urdf").text(tmp_path))
+    entry = load_robot(str(tmp_path / "r.yaml"))
+    compiled = compile_with_report(load(stage(entry)).spec)
+    oracle: Any = oracle_of(entry, compiled.world)
+    notes = compiled.report["robot"]
+    assert source_check(compiled.world, oracle, notes).passed
+    assert oracle.mass == 41.0
+    oracle.mass -= 0.01
+    assert source_check(compiled.world, oracle, notes).passed is False
+
+
+def test_the_oracle_moves_followers_of_followers(tmp_path: Path) -> None:
+    joint = '<joint name="{1}" type="revolute"><parent link="{0}"/><child link="{1}"/><origin xyz="1 0 0"/>'
+    joint += '<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/>{2}</joint>'
+    mimic = '<mimic joint="{0}" multiplier="{1}" offset="{2}"/>'
+    joints = [joint.format(*"ab", ""), joint.format(*"bc", mimic.format("b", 2, 0.1))]
+    joints.append(joint.format(*"cd", mimic.format("c", -1, 0.2)))
+    links = "".join(f'<link name="{name}"/>' for name in "abcd")
+    (tmp_path / "chain.urdf").write_text(f'<robot name="r">{links}{"".join(joints)}</robot>')
+    found = Urdf(tmp_path / "chain.urdf", tmp_path).frames({"b": 0.3})
+    turn = 0.3 + 0.7 + (0.2 - 0.7)
+    assert found["d"][3:] == pytest.approx([0, 0, np.sin(turn / 2), np.cos(turn / 2)])
 
 
 def test_a_fault_and_a_replay_that_differs_are_named() -> None:

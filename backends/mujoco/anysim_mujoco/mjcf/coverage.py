@@ -29,8 +29,8 @@ _LAWS = "a motor, position or velocity drive of one hinge or slide becomes a dri
 FIELDS: Mapping[str, tuple[Row, ...]] = {
     "body": (
         Row(_EXACT, f"{_POSE} mass ipos iquat ialt inertia fullinertia explicitinertial"),
+        Row(_EXACT, "mocap", "it is fixed, and its pose a part of each env's state, which may be written at any time"),
         Row(_ABOUT, "gravcomp", "all of the weight, or none below a half"),
-        Row(_OUT, "mocap", "it stays where it is"),
         Row(_OUT, "userdata", _NUMBERS),
         Row(_OUT, "plugin", "it is MuJoCo's alone"),
         Row(_IDLE, "simple fuse sleep", "it is of how MuJoCo computes"),
@@ -118,7 +118,7 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_ABOUT, "qpos", "the one that is called `home`"),
         Row(_OUT, "qvel", "everything begins at rest"),
         Row(_OUT, "act ctrl", "commands are a task's"),
-        Row(_OUT, "mpos mquat", "what a mocap body is here stays where it is"),
+        Row(_ABOUT, "mpos mquat", "those of the one that is called `home`, in a scene; a world places an asset"),
         Row(_IDLE, "time", "an episode begins at 0"),
     ),
     "option": (
@@ -160,8 +160,7 @@ WHOLE: Mapping[str, Row] = {
     "skin bone": Row(_OUT, "", "bodies are drawn by their geoms"),
     "camera": Row(_OUT, "", _OWN),
     "light": Row(_OUT, "", _OWN),
-    "pair": Row(_OUT, "", "geoms meet by their masks, with the friction of both"),
-    "sensor": Row(_OUT, "", _OWN),
+    "pair": Row(_ABOUT, "", "geoms meet by their masks, with what both have; the report names pairs that differ"),
     "numeric": Row(_OUT, "", _ALONE),
     "text": Row(_OUT, "", _ALONE),
     "tuple element": Row(_OUT, "", _ALONE),
@@ -169,11 +168,37 @@ WHOLE: Mapping[str, Row] = {
     "flag": Row(_OUT, "", "they are MuJoCo's alone"),
     "size": Row(_IDLE, "", "memory is the engine's"),
     "visual global quality headlight map scale rgba statistic": Row(_IDLE, "", "it is of MuJoCo's own viewer"),
-    "mujoco worldbody asset tendon equality actuator keyframe custom deformable user": Row(
+    "mujoco worldbody asset tendon equality actuator keyframe custom deformable sensor user": Row(
         _IDLE, "", "it holds others"
     ),
 }
-"""The elements that have one fate as a whole. Everything below <sensor> shares that of it."""
+"""The elements that have one fate as a whole."""
+
+_STATE, _FRAMES = "the state has it; `joints` reads that of a robot", "`tracking` has quaternions in the world's axes"
+SENSORS: Mapping[str, Row] = {
+    "accelerometer gyro": Row(_ABOUT, "", "an `imu`: averages over its period"),
+    "force torque": Row(_ABOUT, "", "a `force_torque`: averages over its period, of a body that a joint carries"),
+    "touch": Row(_ABOUT, "", "a `touch`; an ellipsoid is left out, and contacts of what is rigidly joined count too"),
+    "rangefinder": Row(_ABOUT, "", "a `lidar` of one ray, which reads its far end where MuJoCo has -1"),
+    "framepos framequat framelinvel frameangvel": Row(
+        _ABOUT, "", "a `tracking`, exact; one with `reftype`, or of an inertial frame or a geom, is left out"
+    ),
+    "jointpos jointvel jointactuatorfrc ballquat ballangvel actuatorpos actuatorvel actuatorfrc": Row(_OUT, "", _STATE),
+    "jointlimitpos jointlimitvel jointlimitfrc tendonlimitpos tendonlimitvel tendonlimitfrc": Row(
+        _OUT, "", "engines do not tell of their limits"
+    ),
+    "tendonpos tendonvel tendonactuatorfrc": Row(_OUT, "", "no sensor reads tendons"),
+    "velocimeter framexaxis frameyaxis framezaxis": Row(_OUT, "", _FRAMES),
+    "framelinacc frameangacc": Row(_OUT, "", "`imu` has averages over its period"),
+    "subtreecom subtreelinvel subtreeangmom e_potential e_kinetic": Row(_OUT, "", "it follows from the state"),
+    "clock": Row(_OUT, "", "every reading has its time"),
+    "magnetometer": Row(_OUT, "", "there is no magnetic field"),
+    "camprojection": Row(_OUT, "", "it follows from the camera and the state"),
+    "insidesite distance normal fromto contact tactile": Row(_OUT, "", "no sensor of worlds reads it"),
+    "user plugin": Row(_OUT, "", "it is a program's own"),
+}
+"""What is below <sensor>. Beside it, `cutoff` of what is no rangefinder, `noise`, which MuJoCo itself does not add,
+`delay`, `nsample`, `interp`, `interval` and `user` are left out."""
 
 BOOKKEEPING = frozenset(
     "id info signature compiler name classname parent frame childclass group element authored "
@@ -246,6 +271,11 @@ def whole(tag: str) -> Row | None:
     return _BY_TAG.get(tag)
 
 
+def sensor_row(tag: str) -> Row | None:
+    """The row of an element below <sensor>."""
+    return _BY_SENSOR.get(tag)
+
+
 def attributes(kind: str, field: str) -> list[str]:
     """The attributes of a file that set a field."""
     return ATTRIBUTES.get(f"{kind}.{field}", ATTRIBUTES.get(field, field)).split()
@@ -259,7 +289,10 @@ def rows() -> Iterator[tuple[str, str, Fate, str]]:
             yield kind, " ".join(names), row.fate, row.text
     for tags, row in WHOLE.items():
         yield tags, "", row.fate, row.text
+    for tags, row in SENSORS.items():
+        yield " ".join(f"sensor/{tag}" for tag in tags.split()), "", row.fate, row.text
 
 
 _BY_FIELD = {(kind, name): row for kind, own in FIELDS.items() for row in own for name in row.names.split()}
 _BY_TAG = {tag: row for tags, row in WHOLE.items() for tag in tags.split()}
+_BY_SENSOR = {tag: row for tags, row in SENSORS.items() for tag in tags.split()}

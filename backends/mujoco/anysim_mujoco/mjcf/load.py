@@ -1,8 +1,8 @@
 """MJCF to the parts of a World, from MuJoCo's own compiled reading of the file.
 
 Rules where the neutral model is narrower; each use is a note in the report:
-- One kinematic tree, of several the one that is asked for: geoms of the world beside it, cameras, lights and sensors
-  stay behind. A tree whose first body has hinges or slides gets a fixed base at the file's origin.
+- One kinematic tree, of several the one that is asked for: geoms of the world beside it, cameras and lights stay
+  behind, its sensors are hints. A tree whose first body has hinges or slides gets a fixed base at the file's origin.
 - Bodies without a joint are lumped into their parent; the frame survives as a site, the inertia is composed exactly.
 - A body with several joints becomes a chain: each extra link takes a share of `JOINT_SHARE` of its mass and inertia,
   and the body still collides with neither its parent nor what it did not collide with.
@@ -25,7 +25,7 @@ import numpy as np
 
 from anysim import cache
 from anysim.assets.meshes import VISUAL_ERROR
-from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote
+from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote, SensorHint
 from anysim.assets.scene import PART
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
@@ -39,8 +39,9 @@ from anysim_mujoco.mjcf.couplings import Couplings
 from anysim_mujoco.mjcf.drives import drive_hint, left_out, shared
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
-from anysim_mujoco.mjcf.pairs import PairReader
+from anysim_mujoco.mjcf.pairs import PairReader, of_pairs
 from anysim_mujoco.mjcf.part import unqualified
+from anysim_mujoco.mjcf.sensors import SensorReader, told_of
 from anysim_mujoco.mjcf.unheld import of_tendons
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -78,6 +79,7 @@ class _MjcfImport:
         self.place: dict[str, int] = {}
         self.frames: dict[int, tuple[int, Array]] = {}  # MuJoCo body: neutral body, pose in it
         self.number: dict[int, int] = {}  # MuJoCo joint: neutral joint
+        self.site_names: dict[int, str] = {}  # of MuJoCo's sites
         source = cache.digest(path.read_bytes(), model.mesh_vert.tobytes(), model.mesh_face.tobytes())
         self.geometry = GeomReader(model, source, scale, visual_error, self.notes)
 
@@ -90,6 +92,7 @@ class _MjcfImport:
         couplings = self._couplings()
         self._inertials()
         geometry = self.geometry
+        sensors = self._sensors(bool(part))
         return ImportedModel(
             name=self.path.stem,
             bodies=tuple(self.bodies),
@@ -107,7 +110,9 @@ class _MjcfImport:
             tendons=tuple(couplings.tendons()),
             constraints=tuple(couplings.constraints()),
             spatial_tendons=tuple(couplings.spatial_tendons()),
+            sensors=sensors,
             report=tuple(self.notes),
+            wholes=geometry.wholes,
         )
 
     # ------------------------------------------------------------------ the tree
@@ -246,8 +251,17 @@ class _MjcfImport:
             if name != given:
                 self._note("info", f"site '{given}'", f"is found as '{name}': a body has its name")
             taken.add(name)
+            self.site_names[s] = name
             pose = P.compose(frame, pose_of(model.site_pos[s], model.site_quat[s], self.scale))
             self.sites.append(Site(name, body, *split(pose)))
+
+    def _sensors(self, part: bool) -> tuple[SensorHint, ...]:
+        """Those of the file; a scene makes sensors of those of its parts."""
+        parts = Counter(body for body, _ in self.frames.values())
+        joined = frozenset(number for number, (body, _) in self.frames.items() if parts[body] > 1)
+        hints, notes = SensorReader(self.model, self.site_names, self.links, joined, self.scale).read()
+        self.notes += [*notes, *([] if part else [*told_of(hints), *of_pairs(self.model)])]
+        return tuple(hints)
 
     # ------------------------------------------------------------------ joints
 

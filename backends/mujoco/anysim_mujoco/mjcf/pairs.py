@@ -1,13 +1,16 @@
 """The pairs of neutral bodies that never collide, of what an MJCF file says of bodies and geoms.
 
 MuJoCo filters geoms by masks, and bodies before rigid ones are lumped; the neutral model knows pairs of whole bodies.
-Where those differ a pair collides, unless shapes that the file excludes from each other overlap from the start.
+Where those differ a pair collides, unless shapes that the file excludes from each other overlap from the start. Of
+geoms that a file pairs (`<pair>`) the report says what is lost.
 """
 
 from collections.abc import Mapping, Sequence
 from itertools import product
+from typing import Any
 
 import mujoco
+import numpy as np
 
 from anysim.assets.model import ImportNote
 from anysim.errors import listing
@@ -89,3 +92,65 @@ class PairReader:
             self._data = mujoco.MjData(model)
             mujoco.mj_kinematics(model, self._data)
         return mujoco.mj_geomDistance(model, self._data, first, second, 1.0, None) < 0.0
+
+
+# ------------------------------------------------------------------ pairs of geoms that a file names
+
+
+def of_pairs(model: Any) -> list[ImportNote]:
+    """What is lost of each `<pair>` of a compiled file: nothing where its geoms would meet so without it."""
+    told: dict[str, list[str]] = {}
+    for number in range(model.npair):
+        first, second = int(model.pair_geom1[number]), int(model.pair_geom2[number])
+        geoms = [model.geom(g).name or f"geom{g}" for g in (first, second)]
+        who = model.pair(number).name or " and ".join(geoms)
+        if _kept_apart(model, first, second):
+            told.setdefault("do not meet here, where masks or bodies keep their geoms apart", []).append(who)
+        elif other := _differing(model, number, first, second):
+            effect = f"meet with what their two geoms have, not with the {', '.join(other)} of the pair"
+            told.setdefault(effect, []).append(who)
+    return [
+        ImportNote("dropped", "pairs", f"{effect} ({len(ones)}: {listing(ones, 3)})") for effect, ones in told.items()
+    ]
+
+
+def _kept_apart(model: Any, first: int, second: int) -> bool:
+    """Whether two geoms meet by their pair alone: masks, an exclusion, or one body or neighbours keep them apart."""
+    masks = model.geom_contype, model.geom_conaffinity
+    if not (masks[0][first] & masks[1][second] or masks[0][second] & masks[1][first]):
+        return True
+    bodies = sorted(int(model.geom_bodyid[g]) for g in (first, second))
+    if (bodies[0] << 16) + bodies[1] in model.exclude_signature:
+        return True
+    one, other = (int(model.body_weldid[body]) for body in bodies)
+    above = [int(model.body_weldid[model.body_parentid[body]]) for body in (one, other)]
+    return one == other or (bool(one and other) and (above[0] == other or above[1] == one))
+
+
+def _differing(model: Any, number: int, first: int, second: int) -> list[str]:
+    """The attributes of a pair that are not those which MuJoCo makes of its two geoms."""
+    geoms = [first, second]
+    priority = model.geom_priority[geoms]
+    if priority[0] != priority[1]:
+        geoms = [geoms[int(np.argmax(priority))]]
+    mix = model.geom_solmix[geoms] / max(1e-12, float(model.geom_solmix[geoms].sum()))
+    slide, turn, roll = model.geom_friction[geoms].max(axis=0)
+    solref = model.geom_solref[geoms]
+    usual = {
+        "condim": model.geom_condim[geoms].max(),
+        "friction": [slide, slide, turn, roll, roll],
+        "solref": mix @ solref if (solref[:, 0] > 0).all() else solref.min(axis=0),
+        "solimp": mix @ model.geom_solimp[geoms],
+        "margin": model.geom_margin[[first, second]].sum(),
+        "gap": model.geom_gap[[first, second]].sum(),
+    }
+    own = {key: np.asarray(getattr(model, f"pair_{'dim' if key == 'condim' else key}")[number]) for key in usual}
+    used = {"friction": {1: 0, 3: 2, 4: 3, 6: 5}[int(own["condim"])]}  # a contact without friction heeds none
+    different = []
+    for key, value in usual.items():
+        gap = np.atleast_1d(np.abs(own[key] - np.asarray(value)))[: used.get(key)]
+        if gap.size and gap.max() > 1e-12:
+            different.append(key)
+    if np.any(model.pair_solreffriction[number]):
+        different.append("solreffriction")
+    return different

@@ -42,7 +42,9 @@ def scene_part(spec: Any, path: Path, name: str) -> list[ImportNote]:
         AssetError: there is no such body.
     """
     bodies, notes = bodies_of(spec), list[ImportNote]()
-    for one in (*spec.sensors, *spec.pairs):  # which the scene has told of
+    kept = (mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_XBODY)
+    loose = [one for one in spec.sensors if one.objtype not in kept]
+    for one in (*loose, *spec.pairs):  # which the scene has told of
         spec.delete(one)
     if name:
         if name not in bodies:
@@ -53,6 +55,9 @@ def scene_part(spec: Any, path: Path, name: str) -> list[ImportNote]:
         if not bodies[name].name:
             bodies[name].name = f"body{name}"
         notes += keep(spec, path, bodies[name].name)
+        fixed = {site.name for site in spec.worldbody.sites}
+        for one in [one for one in spec.sensors if one.objname in fixed and one.objtype == mujoco.mjtObj.mjOBJ_SITE]:
+            spec.delete(one)
     else:
         for looking in (*spec.cameras, *spec.lights, *bodies.values()):
             spec.delete(looking)
@@ -128,7 +133,8 @@ def unqualified(model: ImportedModel, name: str) -> ImportedModel:
     if any(len({part.name for part in parts}) < len(parts) for parts in several.values()):
         return model
     links = {short(link): body for link, body in model.links.items()}
-    return replace(model, **several, links=links, geom_links=tuple(map(short, model.geom_links)))
+    sensors = tuple(hint._replace(frame=short(hint.frame)) for hint in model.sensors)
+    return replace(model, **several, links=links, geom_links=tuple(map(short, model.geom_links)), sensors=sensors)
 
 
 def keep(spec: Any, path: Path, body: str) -> list[ImportNote]:
@@ -152,4 +158,5 @@ def keep(spec: Any, path: Path, body: str) -> list[ImportNote]:
 
 def _ties(spec: Any) -> Counter[str]:
     """How many elements there are that may tie one body to another."""
-    return Counter({"equalities": len(spec.equalities), "tendons": len(spec.tendons)})
+    kinds = {"equalities": spec.equalities, "tendons": spec.tendons, "pairs": spec.pairs}
+    return Counter({kind: len(elements) for kind, elements in kinds.items()})

@@ -16,6 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from anysim import registry
 from anysim.assets.bounded_files import check, xml_root
 from anysim.assets.scene import PART, control_step, free_name, placed
 from anysim.conventions import GROUND, Array
@@ -23,7 +24,10 @@ from anysim.errors import listing
 from anysim.math import pose as P
 from anysim_mujoco.mjcf.file import compile_noting, opened
 from anysim_mujoco.mjcf.geoms import pose_of
+from anysim_mujoco.mjcf.load import import_mjcf
+from anysim_mujoco.mjcf.pairs import of_pairs
 from anysim_mujoco.mjcf.part import bodies_of, ground_of, owner_of
+from anysim_mujoco.mjcf.sensors import body_of, tag_of
 from anysim_mujoco.mjcf.unheld import of_scene, value_of
 from anysim_schemas.limits import SCENE_PARTS
 from anysim_schemas.scene import ImportedScene, SceneEntry, SceneNote
@@ -70,12 +74,15 @@ def read_mjcf_scene(path: Path, *, root: Path, uri: str, packages: Mapping[str, 
         check(path, SCENE_PARTS, len(bodies))
         notes += of_scene(spec)
         model = compile_noting(spec, notes)
-        return _Scene(path, uri, spec, bodies, model, [(n.kind, n.where, n.message) for n in notes]).read()
+        notes += of_pairs(model)
+        told: list[SceneNote] = [(n.kind, n.where, n.message) for n in notes]
+        return _Scene(path, root, uri, spec, bodies, model, told).read()
 
 
 @dataclass
 class _Scene:
     path: Path
+    root: Path
     uri: str
     spec: Any
     bodies: Mapping[str, Any]
@@ -99,6 +106,7 @@ class _Scene:
             self._object(part)
         self._lights()
         self._cameras()
+        self._sensors()
         self._apart()
         return ImportedScene(tuple(self.entries), tuple(self.notes))
 
@@ -258,6 +266,31 @@ class _Scene:
         for key, why in fields.items():
             if value_of(element, key) != value_of(fresh, key):
                 self._note("dropped", where, f"its {key} is left out: {why}")
+
+    # ------------------------------------------------------------------ sensors
+
+    def _sensors(self) -> None:
+        """Those of each part, whose importer knows what its frames are called; of the others that they are not."""
+        model, there, alone, taken = self.model, set(registry.names("sensors")), list[str](), list[str]()
+        on = [int(model.body_rootid[body]) if (body := body_of(model, s)) >= 0 else -1 for s in range(model.nsensor)]
+        for part, owner in self.names.items():
+            if (self.bodies[part].id if part else 0) not in on:
+                continue
+            read = import_mjcf(self.path, root=self.root, body=f"{PART}{part}")
+            for hint in read.sensors:
+                frame = owner if hint.frame in ("", read.bodies[0].name) else f"{owner}.{hint.frame}"
+                if hint.kind not in there:
+                    alone.append(hint.name)
+                    continue
+                name = self._name(hint.name, hint.kind, taken)
+                taken.append(name)
+                element = next((one for one in self.spec.sensors if one.name == hint.sources[0]), None)
+                self._put(("world", "sensors", name), {"sensor": hint.kind, "frame": frame, **hint.params}, element)
+        if alone:
+            text = f"are left out: no installed sensor reads them ({len(alone)}: {listing(alone, 3)})"
+            self._note("dropped", "sensors", text)
+        if rest := [model.sensor(s).name or tag_of(model, s) for s, root in enumerate(on) if root < 0]:
+            self._note("dropped", "sensors", f"on no body are left out ({len(rest)}: {listing(rest, 3)})")
 
     # ------------------------------------------------------------------ collisions
 

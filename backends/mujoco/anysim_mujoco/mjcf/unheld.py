@@ -34,13 +34,15 @@ PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
     ("equality", "solref"): lambda tie: _solref(tie.solref),
     ("equality", "active"): lambda tie: "" if tie.active else "is inactive, and left out",
     ("key", "qpos"): lambda key: "" if key.name == "home" else "are not kept: only the keyframe 'home' is",
+    ("key", "mpos"): lambda key: "" if key.name == "home" else "are not kept: only the keyframe 'home' is",
+    ("key", "mquat"): lambda key: "" if key.name == "home" else "are not kept: only the keyframe 'home' is",
 }
 """Of fields that are approximated, what is not read of an element; empty where all is. Others are noted elsewhere."""
 
-WHOLE = "texture skin camera light pair sensor numeric text tuple plugin".split()
-"""The elements that are left out with a note each; tendons and flexes have words of their own."""
+WHOLE = "texture skin camera light numeric text tuple plugin".split()
+"""The elements that are left out with a note each; tendons, flexes, sensors and pairs have words of their own."""
 
-OF_SCENE = tuple("option texture skin material camera light sensor pair key numeric text tuple plugin".split())
+OF_SCENE = tuple("option texture skin material camera light key numeric text tuple plugin".split())
 WORLD_OPTIONS = ("timestep", "gravity", "cone", "impratio")
 """What of a file's options the `physics` of a world of it has."""
 _EARLY = ("texture", "skin", "material", "camera", "light")

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ import pytest
 import anysim
 from anysim.errors import SpecError
 from anysim.families.cosolver import CoSolver
+from anysim.record.header import NumberType
 from anysim.task.snapshot import EnvSnapshot
 from anysim.testing.families.fixtures import ENVS, NAME, STEPS, Make, family_of, run, same, seen
 
@@ -43,6 +44,9 @@ def test_state(make: Make) -> None:
     whole = env.families.state(NAME)
     np.testing.assert_array_equal(state.points, whole.points[[2, 0]], "rows are those of the envs asked for")
     assert all(rows.shape[:2] == (2, count) for rows in state.fields.values())
+    color = family_of(env).color
+    assert len(color) == 3
+    assert all(0.0 <= share <= 1.0 for share in color)
 
 
 def test_facts(make: Make) -> None:
@@ -57,6 +61,7 @@ def test_facts(make: Make) -> None:
     assert set(facts) <= own
     for key, rows in env.families.recorded(np.array([1, 2])).items():
         assert len(rows) == 2, key
+        assert str(rows.dtype) in get_args(NumberType), f"{key}: a recording has no numbers of type {rows.dtype}"
         assert np.isfinite(rows).all(), key
 
 

@@ -13,8 +13,9 @@ from anysim.assets.load import import_asset, split_body
 from anysim.assets.model import ImportedModel
 from anysim.errors import AssetError
 from anysim.model.world import ControlMode, Joint
-from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SETTLING, STANDING, Gains, gains
+from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SAG, SETTLING, STANDING, Gains, gains
 from anysim_robots.drafting.guess import Guess, guess, home_of, within
+from anysim_robots.drafting.places import places, quoted
 from anysim_robots.drafting.sources import source_of
 from anysim_robots.drafting.srdf import Srdf, beside, read
 from anysim_robots.drafting.stance import stood
@@ -61,9 +62,9 @@ class Draft(NamedTuple):
             *lines,
             f"name: {self.name}",
             f"description: {len(self.model.joints)} joints, from {self.file.name}  # TODO one line for people",
-            f"source: {_quoted(source)}",
+            f"source: {quoted(source)}",
             *(
-                ["params:", *(f"  {_quoted(k)}: {json.dumps(v)}" for k, v in self.arguments.items())]
+                ["params:", *(f"  {quoted(k)}: {json.dumps(v)}" for k, v in self.arguments.items())]
                 * bool(self.arguments)
             ),
             *self._packages(folder),
@@ -84,7 +85,7 @@ class Draft(NamedTuple):
             name: str(place.relative_to(folder) if place.is_relative_to(folder) else place)
             for name, place in self.packages.items()
         }
-        return ["packages:", *(f"  {_quoted(name)}: {_quoted(place)}" for name, place in places.items())]
+        return ["packages:", *(f"  {quoted(name)}: {quoted(place)}" for name, place in places.items())]
 
     def _channels(self) -> list[str]:
         g = self.guess
@@ -100,11 +101,13 @@ class Draft(NamedTuple):
         lines[-1] += (
             f"; legs: kp at least {STANDING:g} m times the weight, kd {SETTLING:g} s times kp." if legs else "."
         )
+        if not _compensated(g):
+            lines += [f"# No weight is compensated: kp is at least what bears it within {SAG:g} rad or m of home."]
         lines.append("channels:")
         for name, joints in channels.items():
             if not joints:
                 continue
-            lines += [f"  {name}:", f"    joints: [{', '.join(map(_quoted, joints))}]", "    joint_gains:"]
+            lines += [f"  {name}:", f"    joints: [{', '.join(map(quoted, joints))}]", "    joint_gains:"]
             velocity = set(joints) <= set(g.wheels)
             if velocity:
                 lines.insert(-1, "    mode: velocity")
@@ -119,7 +122,7 @@ class Draft(NamedTuple):
         """Parts of a channel that the SRDF names."""
         groups = {} if self.srdf is None else self.srdf.groups
         inside = {name: own for name, own in groups.items() if set(own) < set(joints) and re.fullmatch(r"\w+", name)}
-        lines = [f"      {_quoted(name)}: [{', '.join(map(_quoted, own))}]" for name, own in inside.items()]
+        lines = [f"      {quoted(name)}: [{', '.join(map(quoted, own))}]" for name, own in inside.items()]
         return ["    groups:  # of the SRDF", *lines] if lines else []
 
     def _drive(self, name: str, mode: ControlMode) -> str:
@@ -139,7 +142,7 @@ class Draft(NamedTuple):
         if _limit(self.model, joint) is None:
             values.append(f"effort_limit: {float(f'{max(1.0, own.kp):.2g}'):g}")
         told = f"  # the file's: {', '.join(of_file)}" if of_file else ""
-        return f"      {_quoted(name)}: {{{', '.join(values)}}}{told}"
+        return f"      {quoted(name)}: {{{', '.join(values)}}}{told}"
 
     def _controllers(self, name: str, joints: tuple[str, ...]) -> list[str]:
         if name == "eef":
@@ -187,22 +190,23 @@ class Draft(NamedTuple):
             if name != told and pose:
                 lines.append(f"# Pose '{name}' of the SRDF: {{{', '.join(f'{j}: {v:g}' for j, v in pose.items())}}}")
         if home:
-            lines += ["home:", *(f"  {_quoted(joint)}: {value!r}" for joint, value in home.items())]
+            lines += ["home:", *(f"  {quoted(joint)}: {value!r}" for joint, value in home.items())]
         if g.tool is not None:
             lines += [
                 "tools:",
-                f"  tool: {{link: {_quoted(g.tool)}}}  # z should point out of the hand, y along the opening",
+                f"  tool: {{link: {quoted(g.tool)}}}  # z should point out of the hand, y along the opening",
             ]
         if g.legs:
             lines += ["legs:"]
             for leg in g.legs:
-                joints = ", ".join(map(_quoted, leg.joints))
-                lines.append(f"  {leg.name}: {{joints: [{joints}], foot: {_quoted(leg.foot)}}}")
-        weighed = "false" if g.floating or g.anchored else "true"
+                joints = ", ".join(map(quoted, leg.joints))
+                lines.append(f"  {leg.name}: {{joints: [{joints}], foot: {quoted(leg.foot)}}}")
+        lines += places(self.model)
+        weighed = "true" if _compensated(g) else "false"
         apart = () if self.srdf is None else self.srdf.apart
         if apart:
             lines.append("# Pairs of the SRDF, for `self_collision: true`")
-            lines += ["self_collision_exclusions:", *(f"  - [{_quoted(a)}, {_quoted(b)}]" for a, b in apart)]
+            lines += ["self_collision_exclusions:", *(f"  - [{quoted(a)}, {quoted(b)}]" for a, b in apart)]
         lines += ["self_collision: false", f"gravity_compensation: {weighed}"]
         return lines
 
@@ -252,7 +256,7 @@ def draft(
         path,
         model,
         found,
-        gains(model, found.floating, legs),
+        gains(model, found.floating, legs, weighed=not _compensated(found)),
         tuple(_open(model, found)),
         notes,
         folders,
@@ -260,6 +264,11 @@ def draft(
         source.uri,
         srdf,
     )
+
+
+def _compensated(found: Guess) -> bool:
+    """Whether what a joint bears is compensated: of robots that are bolted down, or carried over the ground."""
+    return not (found.floating or found.anchored)
 
 
 def _home_pose(srdf: Srdf | None) -> str:
@@ -311,7 +320,8 @@ def _open(model: ImportedModel, found: Guess) -> list[str]:
         asked.append(f"effort limits: the source has none for {', '.join(unlimited[:6])}{'…' * (len(unlimited) > 6)}")
     if not any(geom.collides for geom in model.geoms):
         asked.append("collision shapes: the source has none; the robot passes through everything")
-    asked.append("sensors, surfaces and self_collision are not in the file")
+    rest = "surfaces and self_collision are not in the file"
+    asked.append(rest if model.sensors else f"sensors, {rest}")
     return asked
 
 
@@ -337,11 +347,3 @@ def _source(file: Path, folder: Path, made: Draft) -> str:
             return str(file)
         return relative
     return str(file)
-
-
-def _quoted(word: str) -> str:
-    """A YAML scalar."""
-    return word if re.fullmatch(r"[A-Za-z_/.][\w./-]*", word) and word.lower() not in _WORDS else f'"{word}"'
-
-
-_WORDS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "y", "n", "."})

@@ -84,9 +84,12 @@ def guess(model: ImportedModel) -> Guess:
     chains = _chains(model)
     low = _lowest(world)
     legs = _legs(model, chains, low)
-    if len(legs) < len(around := _around(model, chains)):
+    around, lies = _around(model, chains)
+    if len(legs) < len(around):
         legs = around
         reasons.append(f"legs: {len(legs)} alike chains, as many at each corner of the base")
+    if lies and len(legs) >= 4:
+        reasons.append("legs: y is up in the file, so that it lies on its side here; place it with `roll`: 1.5708")
     rails = _rails(model)
     passive = {j for j in rails if model.actuator_hints and not any(hint.joint == j for hint in model.actuator_hints)}
     names = {i: model.joints[i].name for i in driven if i not in passive}
@@ -97,8 +100,13 @@ def guess(model: ImportedModel) -> Guess:
     carried = [names[j] for j in rails if j in names] if len(slides) == 2 and len(rails) <= 3 else []
     arm = [n for n in names.values() if n not in {*in_legs, *wheels, *eef, *carried}]
     planted = bool(rails) and not model.bodies[0].inertial.mass
-    floating = model.bodies[0].kind is BodyKind.FREE or ((len(legs) >= 2 or len(wheels) >= 2) and not planted)
-    if planted and not floating and (passive or len(legs) >= 2 or len(wheels) >= 2):
+    stands = any(geom.collides for geom in model.geoms)
+    floating = model.bodies[0].kind is BodyKind.FREE or (
+        (len(legs) >= 2 or len(wheels) >= 2) and not planted and stands
+    )
+    if not stands and not floating and not planted and (len(legs) >= 2 or len(wheels) >= 2):
+        reasons.append("base: fixed; nothing of it collides, and without collision shapes it would fall for ever")
+    elif planted and not floating and (passive or len(legs) >= 2 or len(wheels) >= 2):
         how = ", ".join(model.joints[j].name for j in rails)
         reasons.append(f"base: fixed; its first body moves against the world by {how}")
     elif carried and planted:
@@ -201,8 +209,11 @@ def _legs(model: ImportedModel, chains: list[list[int]], low: float) -> list[Leg
     return found
 
 
-def _around(model: ImportedModel, chains: list[list[int]]) -> list[Leg]:
-    """Chains of two joints and more of one length, as many in each of the four corners about their middle: legs."""
+def _around(model: ImportedModel, chains: list[list[int]]) -> tuple[list[Leg], bool]:
+    """Chains of two joints and more of one length, as many in each of the four corners about their middle: legs.
+
+    And whether these corners are about the y axis, not about z.
+    """
     length = max((len(chain) for chain in chains), key=[len(chain) for chain in chains].count, default=0)
     chains = [chain for chain in chains if len(chain) == length]
     words = [model.joints[i].name for chain in chains for i in chain]
@@ -212,7 +223,7 @@ def _around(model: ImportedModel, chains: list[list[int]]) -> list[Leg]:
         or len({chain[0] for chain in chains}) < len(chains)
         or any(map(FINGER.search, words))
     ):
-        return []
+        return [], False
     begin = np.array([model.bodies[model.joints[chain[0]].body].position for chain in chains])
     for plane in ([0, 1], [0, 2]):
         side = np.sign((begin - begin.mean(axis=0))[:, plane].round(4))
@@ -220,12 +231,11 @@ def _around(model: ImportedModel, chains: list[list[int]]) -> list[Leg]:
         if all(corners.count((x, y)) * 4 == len(chains) for x in (1.0, -1.0) for y in (1.0, -1.0)):
             break
     else:
-        return []
+        return [], False
     tips = [model.joints[chain[-1]].body for chain in chains]
     joints = [tuple(model.joints[i].name for i in chain if model.joints[i].mimic is None) for chain in chains]
-    return [
-        Leg(f"leg_{i}", own, _foot(model, tip)) for i, (own, tip) in enumerate(zip(joints, tips, strict=True)) if own
-    ]
+    pairs = enumerate(zip(joints, tips, strict=True))
+    return [Leg(f"leg_{i}", own, _foot(model, tip)) for i, (own, tip) in pairs if own], plane == [0, 2]
 
 
 def _rails(model: ImportedModel) -> list[int]:

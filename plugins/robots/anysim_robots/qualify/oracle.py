@@ -6,10 +6,10 @@ importer of that format. Where a robot has none (a procedural one), its Pinocchi
 importer and nothing of the engines.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -161,6 +161,7 @@ class Urdf:
         if several:
             raise PluginError(f"yourdfpy does not move joints of several axes ({several[0].type} '{several[0].name}')")
         moving = [joint for joint in robot.joints if joint.type not in ("fixed", "floating")]
+        _lead(moving)
         self.joints: int | None = len(moving)
         masses = [link.inertial.mass for link in robot.links if link.inertial is not None]
         self.mass: float | None = float(sum(mass for mass in masses if mass is not None and isfinite(mass)))
@@ -179,6 +180,22 @@ class Urdf:
         known = self._file.actuated_joint_names
         self._file.update_cfg({name: value for name, value in joint_pos.items() if name in known})
         return {link: _pose(self._file.get_transform(link, self.root)) for link in self._file.link_map}
+
+
+def _lead(joints: Sequence[Any]) -> None:
+    """Let what follows a follower follow the first of them: yourdfpy has the others stand still."""
+    by_name = {joint.name: joint for joint in joints}
+    for joint in joints:
+        seen = {joint.name}
+        while joint.mimic is not None and joint.mimic.joint in by_name and joint.mimic.joint not in seen:
+            above = by_name[joint.mimic.joint].mimic
+            if above is None:
+                break
+            seen.add(joint.mimic.joint)
+            own, on = joint.mimic, 1.0 if joint.mimic.multiplier is None else joint.mimic.multiplier
+            ratio = 1.0 if above.multiplier is None else above.multiplier
+            offset = on * (above.offset or 0.0) + (own.offset or 0.0)
+            joint.mimic = type(own)(joint=above.joint, multiplier=on * ratio, offset=offset)
 
 
 def _pose(matrix: Array) -> Array:

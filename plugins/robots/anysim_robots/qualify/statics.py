@@ -1,5 +1,7 @@
 """The checks in which nothing moves by itself: what was built is what the source says."""
 
+import re
+
 import numpy as np
 
 from anysim.assets.model import ImportNote
@@ -18,9 +20,11 @@ CONFIGURATIONS = 20
 MASS = 1e-5
 """Relative."""
 FRAMES = 1e-6
-"""[m], the largest distance between two readings of where a link is."""
+"""[m], the largest distance between two readings of where a link is, and of further out as a share of that distance."""
 VIRTUAL = 0.01
-"""[kg] that an importer may have given to links of a source without mass, in all."""
+"""[kg] that an importer may have given to links of a source without mass, in all; more, where it says how much."""
+GIVEN, ROUNDED = re.compile(r"moves without mass; now (\S+) kg"), 0.01
+"""What it says of such a link, and how far its rounded numbers may be off in all, as a share."""
 
 
 def facts_of(world: World) -> Facts:
@@ -46,7 +50,9 @@ def source_check(world: World, oracle: Oracle, notes: tuple[ImportNote, ...]) ->
     words: list[str] = []
     if joints + frozen != oracle.joints:
         words.append(f"{joints} joints, and {oracle.joints} in the source as {oracle.name} reads it")
-    invented = repaired and 0 < mass - oracle.mass < VIRTUAL
+    given = sum(float(found[1]) for note in notes if (found := GIVEN.search(note.message)))
+    as_told = given > 0 and abs(mass - oracle.mass - given) <= ROUNDED * given
+    invented = repaired and (0 < mass - oracle.mass < VIRTUAL or as_told)
     if off > MASS and not invented:
         words.append(f"{mass:.6g} kg, and {oracle.mass:.6g} kg in the source as {oracle.name} reads it")
     if words:
@@ -97,7 +103,7 @@ def kinematics_check(engine: SimEngine, oracle: Oracle) -> Check:
         for link, frame in frames.items():
             found = P.compose(root, P.compose(poses[frame.body], P.pose(frame.position, frame.quaternion)))
             target = wanted[link] if origin is None else P.compose(origin, wanted[link])
-            distance = float(P.norm(found[:3] - target[:3]))
+            distance = float(P.norm(found[:3] - target[:3])) / max(1.0, float(P.norm(target[:3])))
             if not distance <= worst:
                 worst, where = distance, link
     engine.reset([0])

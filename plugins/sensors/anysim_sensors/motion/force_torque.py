@@ -1,9 +1,10 @@
 """A force and torque sensor at a wrist: what the link that carries it, and all beyond, do to the rest of the robot."""
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.engine.capability import Capability
@@ -27,14 +28,22 @@ class ForceTorque(Sensor):
 
     needs: ClassVar[tuple[Capability, ...]] = (Capability.CONTACT_POINTS,)
 
-    def __init__(self, scene: SceneView, *, frame: Frame) -> None:
+    def __init__(
+        self,
+        scene: SceneView,
+        *,
+        frame: Frame,
+        on: Annotated[
+            Literal["rest", "link"], Field(description="what the force acts on: `link` turns it round")
+        ] = "rest",
+    ) -> None:
         super().__init__(scene.engine.num_envs)
         world = scene.engine.world
         if not isinstance(frame, BodyFrame) or frame.index.body < 0 or world.bodies[frame.index.body].parent < 0:
             raise NameLookupError(
                 f"'{frame.name}' is on nothing that a joint carries; a force and torque sensor sits on a link"
             )
-        self._scene, self._frame = scene, frame
+        self._scene, self._frame, self._sign = scene, frame, 1.0 if on == "rest" else -1.0
         self._bodies = np.array(world.carried_by(frame.index.body))
         self._inside = np.zeros(len(world.bodies) + 1, dtype=bool)  # the last is the world, -1
         self._inside[self._bodies] = True
@@ -74,7 +83,7 @@ class ForceTorque(Sensor):
         weight = self._own["mass"][env_ids, :, None] * gravity(self._scene.engine, env_ids)[:, None]
         centre, _ = self._centres(env_ids)
         passed = np.concatenate([weight.sum(1), P.cross(centre, weight).sum(1)], axis=1)
-        passed += self._touching(env_ids) - (after - before) / self.period
+        passed = self._sign * (passed + self._touching(env_ids) - (after - before) / self.period)
         at, turn = self._frame.position, self._frame.quaternion
         torque = passed[:, 3:] - P.cross(at, passed[:, :3])
         return {"force": P.rotate_inverse(turn, passed[:, :3]), "torque": P.rotate_inverse(turn, torque)}
