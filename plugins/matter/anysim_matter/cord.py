@@ -48,7 +48,7 @@ class Cord:
         return np.logical_or.reduce(near & state.fields["held"], axis=1)
 
     def around(self, post: Frame) -> tuple[Array, Array]:
-        """(n,) [rad] by which it goes around the axis z of a frame, left positive, and (n,) [m] how near it comes to it."""
+        """(n,) [rad] by which it goes around the axis z of a frame, left positive; (n,) [m] how near to it it comes."""
         points = self.state().points
         turn = np.broadcast_to(post.quaternion[:, None], (*points.shape[:2], 4))
         seen = P.rotate_inverse(turn, points - post.position[:, None])[..., :2]
