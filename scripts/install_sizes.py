@@ -50,6 +50,7 @@ WORDS = {
     "legged": "a trot, balance and walking",
     "legged-gym": "the simulator interface of legged-gym training code, on any engine",
     "maniskill": "`anysim verdicts`: peers judge our states; with them `anysim-maniskill[maniskill]`",
+    "matter": "skills with sand and ropes: scooping, and leading around posts",
     "mcap": "recordings: MCAP files and videos",
     "mobile": "bases that drive up to things, follow people, and stop for them; `anysim bench stopping`",
     "mujoco": "the engine MuJoCo, and MJCF files",

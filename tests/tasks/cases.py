@@ -213,6 +213,7 @@ def _rising(robot: str, height: float, angle: float) -> Callable[[TaskEnv, float
 
 
 _POURED = matter.poured(_towards("cup", lambda env: seen(env, "tray")))
+_SCOOPED = matter.poured(_towards("scoop", lambda env: seen(env, "bowl")), "sand", "bowl")
 _BESIDE = _towards("beside", lambda env: level(seen(env, "spot"), seen(env, "beside")))
 _ON_BOTH = _towards("top", lambda env: level(offset(seen(env, "spot"), z=0.04), seen(env, "top")))
 
@@ -594,4 +595,6 @@ CASES: dict[str, Case] = {
     "cowork_place": Case(
         person.placed, [_shifted("red_cube", x=0.06), _shifted("blue_cube", z=0.05), _moving("red_cube")], ("touch",)
     ),
+    "route_cable": Case(matter.routed, [matter.straight, matter.cable_off_goal, matter.take_cable]),
+    "scoop_sand": Case(_SCOOPED, [lambda env: matter.spill(env, "sand", 0.95)]),
 }

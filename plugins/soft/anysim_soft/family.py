@@ -18,8 +18,9 @@ from anysim.math import pose as P
 from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
 from anysim_schemas.base import Spec
-from anysim_soft.spec import MOST, SoftSpec
-from anysim_soft.subworld import NOTHING, FlexSource, Joint, ProxyMass, Scenery, Slots, SubWorld
+from anysim_soft.pads import Pads
+from anysim_soft.spec import MOST, PadSpec, SoftSpec
+from anysim_soft.subworld import FlexSource, Joint, ProxyMass, Scenery, SubWorld
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -34,6 +35,7 @@ class Soft(CoSolver):
         x, v: (N, V, 3) [m], [m/s] the points.
         values: (N, …) the parameters as they are drawn, in the order of `drawn_keys`.
         pending: (N, K, 6) impulses that held bodies will get.
+        pads: the hands that hold it.
     """
 
     drawn = True
@@ -55,15 +57,11 @@ class Soft(CoSolver):
         """Which sides of it are held by which bodies."""
         return ()
 
-    def slots(self) -> Slots:
-        """What bodies may take hold of it while an episode lasts, and which ones do not touch it."""
-        return NOTHING
-
-    def before_solve(self, env: int, sub: SubWorld) -> None:
-        """The world of an env has its state, and its solver is about to move on."""
-
-    def after_solve(self, env: int, sub: SubWorld) -> None:
-        """The solver of an env has moved on."""
+    @classmethod
+    def pads_of(cls, spec: SoftSpec) -> Mapping[str, PadSpec]:
+        """The hands that may hold it."""
+        del spec
+        return {}
 
     @property
     @abstractmethod
@@ -85,6 +83,7 @@ class Soft(CoSolver):
         super().__init__(setting)
         assert isinstance(setting.spec, SoftSpec)
         self.soft = setting.spec
+        self.pads = Pads(setting, self.pads_of(setting.spec))
         world, k = setting.engine.world, len(self.met)
         self.scenery = Scenery.of(world, self.met)
         entity = np.array(world.body_entity, dtype=np.intp)
@@ -112,10 +111,12 @@ class Soft(CoSolver):
             self._holders = np.append(self._holders, [self._met(name, "attached", loose=False)] * len(nodes))
         self.anchors = self.remember("anchors", len(self._nodes), 3)
         joints = self._joints(self.anchors[0])
-        example = SubWorld(source, self.scenery, built, joints, self._step, self._gravity, self.slots())
+        example = SubWorld(source, self.scenery, built, joints, self._step, self._gravity, self.pads.slots(self.met))
         size = len(example.points())
         self.x, self.v = self.remember("x", size, 3), self.remember("v", size, 3)
         self.moved, self.state_row = self.remember("moved", 6), self.remember("state", example.state_size)
+        if len(self.pads):
+            self.pads.remember(self, size)
 
     def _joints(self, anchors: Array) -> list[Joint]:
         rows = zip(self._nodes.tolist(), self._holders.tolist(), anchors, strict=True)
@@ -186,7 +187,8 @@ class Soft(CoSolver):
             values = dict(zip(self.drawn_keys, self.values[env].tolist(), strict=True))
             source = self.source(values, self.frame[env])
             joints = self._joints(self.anchors[env])
-            made = (key, SubWorld(source, self.scenery, bodies, joints, self._step, self._gravity, self.slots()))
+            slots = self.pads.slots(self.met)
+            made = (key, SubWorld(source, self.scenery, bodies, joints, self._step, self._gravity, slots))
             self._worlds[env] = made
         return made[1]
 
@@ -196,6 +198,8 @@ class Soft(CoSolver):
         twist = bodies.twist.copy()
         twist[..., :3] -= P.cross(twist[..., 3:], bodies.com - pose[:, met, :3])
         impulse = np.zeros((len(env_ids), len(met), 6))
+        if len(self.pads):
+            self.pads.look(env_ids, self.x[env_ids], pose, self.engine.get_state().joint_pos[env_ids])
 
         def one(row: int) -> None:
             env = int(env_ids[row])
@@ -205,9 +209,11 @@ class Soft(CoSolver):
             sub.take(self.state_row[env])
             sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
             sub.place()
-            self.before_solve(env, sub)
+            if len(self.pads):
+                sub.hold(*self.pads.held(env))
             done = sub.step(self.soft.substeps, self.parameter("drag", env), env)
-            self.after_solve(env, sub)
+            if len(self.pads):
+                self.pads.felt(env, sub.pulls())
             self.received[env] += done.received
             self.state_row[env], self.moved[env] = sub.state(), sub.momentum()
             points = sub.points()
@@ -255,7 +261,8 @@ class Soft(CoSolver):
     def recorded(self, env_ids: Array) -> Mapping[str, Array]:
         """Momentum of the matter, its middle, and what it received: any difference of a point shows in them."""
         middle = self.x[env_ids].mean(axis=1)
-        return {"middle": middle, "momentum": self.momentum(env_ids), "received": self.received[env_ids]}
+        told = {"middle": middle, "momentum": self.momentum(env_ids), "received": self.received[env_ids]}
+        return told | ({"pads": self.pads.stage[env_ids].astype(np.int8)} if len(self.pads) else {})
 
     def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
         from anysim_particles.draw import draw_triangles

@@ -12,17 +12,15 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import PluginError, SpecError, SpecIssue
 from anysim.families.base import FamilySetting, FamilyState
-from anysim.families.cosolver import MetBodies
 from anysim.math import pose as P
 from anysim_soft.bending import bending_force, bending_matrix, fastest
 from anysim_soft.deformable import contact_of, numbers, on_side
 from anysim_soft.family import UP, Soft
 from anysim_soft.garment_cut import Cut, cut_of
 from anysim_soft.garment_spec import GarmentSpec
-from anysim_soft.pads import Pads
 from anysim_soft.rope import edges
-from anysim_soft.spec import SoftSpec
-from anysim_soft.subworld import FlexSource, Slots, SubWorld
+from anysim_soft.spec import PadSpec, SoftSpec
+from anysim_soft.subworld import FlexSource
 
 MOST_POINTS = 1600
 """Of a garment: its bending takes a matrix of so many rows."""
@@ -39,7 +37,6 @@ class Garment(Soft):
 
     Attributes:
         cut: its form.
-        pads: the hands that hold it.
     """
 
     spec = GarmentSpec
@@ -60,9 +57,12 @@ class Garment(Soft):
         self.cut: Cut = cut_of(setting.spec)
         self._matrix = bending_matrix(self.cut.points, self.cut.hinges)
         self._rate = fastest(self._matrix, self.cut.shares())
-        self.pads = Pads(setting, setting.spec.pads)
         super().__init__(setting)
-        self.pads.remember(self, len(self.cut.points))
+
+    @classmethod
+    def pads_of(cls, spec: SoftSpec) -> Mapping[str, PadSpec]:
+        assert isinstance(spec, GarmentSpec)
+        return spec.pads
 
     @classmethod
     def count(cls, spec: SoftSpec) -> int:
@@ -143,19 +143,6 @@ class Garment(Soft):
     def attached_sides(self) -> list[tuple[str, str]]:
         return [*self.garment.attached.items()]
 
-    def slots(self) -> Slots:
-        return self.pads.slots(self.met)
-
-    def solve(self, env_ids: Array, bodies: MetBodies, duration: float) -> Array:
-        self.pads.look(env_ids, self.x[env_ids], bodies.body_pose, self.engine.get_state().joint_pos[env_ids])
-        return super().solve(env_ids, bodies, duration)
-
-    def before_solve(self, env: int, sub: SubWorld) -> None:
-        sub.hold(*self.pads.held(env))
-
-    def after_solve(self, env: int, sub: SubWorld) -> None:
-        self.pads.felt(env, sub.pulls())
-
     # ------------------------------------------------------------------ what it looks like and means
 
     def mass(self, env: int) -> float:
@@ -170,7 +157,3 @@ class Garment(Soft):
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         more: dict[str, object] = {"area": float(self.cut.areas().sum()), "pads": self.pads.facts(env)}
         return {name: {**known, **more} for name, known in super().facts(env).items()}
-
-    def recorded(self, env_ids: Array) -> Mapping[str, Array]:
-        more = {"pads": self.pads.stage[env_ids].astype(np.int8)} if len(self.pads) else {}
-        return {**super().recorded(env_ids), **more}

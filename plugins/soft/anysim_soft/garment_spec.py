@@ -4,10 +4,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from anysim_schemas.base import Integer, Name, NonNegative, Positive, Reference, Spec
+from anysim_schemas.base import Name, NonNegative, Positive, Reference, Spec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.values import NonNegativeValue, PositiveValue, Value
-from anysim_soft.spec import Edge, SoftSpec
+from anysim_soft.spec import Edge, PadSpec, SoftSpec
 
 Share = Annotated[float, Field(ge=0.0, le=0.8)]
 
@@ -32,17 +32,6 @@ class ShirtSpec(Spec):
         if max(self.cuff, self.neck[1]) >= self.length:
             raise KeyFault(f"it is not shorter than the shirt, which is {self.length:g} m long", "cuff")
         return self
-
-
-class PadSpec(Spec):
-    """A hand that cloth sticks to while it is closed; its links do not touch the garment otherwise."""
-
-    tool: Reference = Field(description="the frame at which it sticks, such as `panda.tool`")
-    joint: Reference = Field(description="the joint that closes the hand, such as `panda.panda_finger_joint1`")
-    closed: float = Field(default=0.01, description="position of that joint [m, rad] at or below which it is closed")
-    reach: Positive = Field(default=0.02, description="how far from the frame cloth sticks when the hand closes [m]")
-    points: Annotated[Integer, Field(ge=1, le=32)] = Field(default=5, description="that stick at most, the nearest")
-    force: Positive = Field(default=20.0, description="[N] beyond which the cloth comes off, until the hand has opened")
 
 
 class GarmentSpec(SoftSpec):

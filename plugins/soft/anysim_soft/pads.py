@@ -1,7 +1,7 @@
-"""Sticky pads: hands that hold cloth by the points which were nearest when they closed.
+"""Sticky pads: hands that hold cloth or a rope by the points which were nearest when they closed.
 
-A declared approximation of fingers that pinch cloth: nothing slips, and the hand's links touch the garment in no other
-place. Which points are held, and where in the hand, is part of the family's memory.
+A declared approximation of fingers that pinch it: nothing slips, and the hand's links touch it in no other place.
+Which points are held, and where in the hand, is part of the family's memory.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from anysim.conventions import Array
 from anysim.errors import AnysimError, PluginError
 from anysim.families.base import Family, FamilySetting
 from anysim.math import pose as P
-from anysim_soft.garment_spec import PadSpec
+from anysim_soft.spec import PadSpec
 from anysim_soft.subworld import Slots
 
 OPEN, HOLDING, EMPTY = 0, 1, 2
@@ -21,11 +21,11 @@ STAGES = ("open", "holding", "empty")
 
 
 class Pads:
-    """The P pads of a garment, each with up to K points.
+    """The P pads of a garment or a rope, each with up to K points.
 
     Attributes:
         stage: (N, P) an index into STAGES.
-        force: (N, P) [N] with which cloth pulls at each.
+        force: (N, P) [N] with which it pulls at each.
     """
 
     stage: Array
@@ -59,7 +59,7 @@ class Pads:
         self.force = family.remember("pad_force", p)
 
     def slots(self, met: Array) -> Slots:
-        """K connections for each pad; its body, and what hangs on it, does not touch the garment."""
+        """K connections for each pad; its body, and what hangs on it, does not touch it."""
         places, silent = [], set[int]()
         number = {int(body): place for place, body in enumerate(met)}
         for name, frame in zip(self.names, self._frames, strict=True):

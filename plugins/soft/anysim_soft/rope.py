@@ -6,10 +6,11 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
+from anysim.families.base import FamilyState
 from anysim.math import pose as P
 from anysim_soft.deformable import contact_of, numbers
 from anysim_soft.family import Soft
-from anysim_soft.spec import RopeSpec, SoftSpec
+from anysim_soft.spec import PadSpec, RopeSpec, SoftSpec
 from anysim_soft.subworld import STIFF, FlexSource
 
 OPTIONS = {"integrator": "implicitfast", "solver": "Newton", "iterations": 100, "tolerance": 1e-12, "cone": "elliptic"}
@@ -29,6 +30,11 @@ class Rope(Soft):
     def count(cls, spec: SoftSpec) -> int:
         assert isinstance(spec, RopeSpec)
         return spec.segments + 1
+
+    @classmethod
+    def pads_of(cls, spec: SoftSpec) -> Mapping[str, PadSpec]:
+        assert isinstance(spec, RopeSpec)
+        return spec.pads or {}
 
     @property
     def rope(self) -> RopeSpec:
@@ -69,6 +75,12 @@ class Rope(Soft):
     def attached_sides(self) -> list[tuple[str, str]]:
         return [*self.rope.attached.items()]
 
+    def state(self, env_ids: Array) -> FamilyState:
+        """Fields: `along` (n, V) [m] where each point is on it from its start, `held` (n, V) by a pad."""
+        state, count = super().state(env_ids), self.rope.segments + 1
+        along = np.broadcast_to(np.linspace(0.0, self.length(), count), (len(env_ids), count))
+        return state._replace(fields={"along": along.copy(), "held": self.pads.points(env_ids, count)})
+
     def mass(self, env: int) -> float:
         return self.parameter("density", env) * np.pi * self.radius**2 * self.length()
 
@@ -79,8 +91,10 @@ class Rope(Soft):
 
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         x = self.x[env]
-        ends = {"start": x[0].tolist(), "end": x[-1].tolist(), "length": float(P.norm(np.diff(x, axis=0)).sum())}
-        ends["carries"] = self.carries(env)
+        ends: dict[str, object] = {"start": x[0].tolist(), "end": x[-1].tolist()}
+        ends |= {"length": float(P.norm(np.diff(x, axis=0)).sum()), "carries": self.carries(env)}
+        if len(self.pads):
+            ends["pads"] = self.pads.facts(env)
         return {name: {**known, **ends} for name, known in super().facts(env).items()}
 
     def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from anysim_schemas.base import Color, Integer, Positive, Reference, Spec, Vec3
+from anysim_schemas.base import Color, Integer, Name, Positive, Reference, Spec, Vec3
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.values import DensityValue, FloatValue, NonNegativeValue, PositiveValue, Value
 
@@ -77,6 +77,17 @@ class DeformableSpec(SoftSpec):
         return self
 
 
+class PadSpec(Spec):
+    """A hand that cloth or a rope sticks to while it is closed; its links do not touch it otherwise."""
+
+    tool: Reference = Field(description="the frame at which it sticks, such as `panda.tool`")
+    joint: Reference = Field(description="the joint that closes the hand, such as `panda.panda_finger_joint1`")
+    closed: float = Field(default=0.01, description="position of that joint [m, rad] at or below which it is closed")
+    reach: Positive = Field(default=0.02, description="how far from the frame it sticks when the hand closes [m]")
+    points: Annotated[Integer, Field(ge=1, le=32)] = Field(default=5, description="that stick at most, the nearest")
+    force: Positive = Field(default=20.0, description="[N] beyond which it comes off, until the hand has opened")
+
+
 class RopeSpec(SoftSpec):
     """A rope that stretches by next to nothing and does not resist bending."""
 
@@ -90,7 +101,7 @@ class RopeSpec(SoftSpec):
     attached: dict[Literal["start", "end"], Reference] = Field(
         default_factory=dict, description="ends that a body holds where they are at the reset"
     )
-
+    pads: dict[Name, PadSpec] | None = Field(default=None, description="hands that hold it while they are closed")
     substeps: Integer = Field(
         default=4, gt=0, le=50, description="of the solver in a physics step: the more, the more it can carry"
     )

@@ -72,3 +72,37 @@ def test_it_lies_over_a_bar_and_does_not_fall_through():
         inside = (np.abs(x[:, 0]) < 0.02) & (x[:, 2] < 0.42) & (x[:, 2] > 0.38)
         assert not inside.any()
         assert x[:, 2].max() > 0.42
+
+
+def test_a_hand_that_closes_holds_a_rope_feels_its_weight_and_is_remembered():
+    """Nothing is lost between hand and rope; a snapshot goes on with the same point; it falls when the hand opens."""
+    pad = {"tool": "panda.tool", "joint": "panda.panda_finger_joint1", "closed": 0.025, "reach": 0.05, "points": 1}
+    panda = {"robot": "franka_panda", "actions": {"arm": "joint_delta_position", "eef": "gripper_binary"}}
+    rope = {"kind": "rope", "path": [[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]], "segments": 8, "density": 800.0, "drag": 3.0}
+    rope |= {"radius": 0.008, "pads": {"hand": pad}}
+    with begun(run_of(rope, world={"robots": {"panda": panda}})) as (env, _):
+        tool = env.scene.frame("panda.tool").position[0].tolist()
+    with begun(run_of({**rope, "position": tool}, world={"robots": {"panda": panda}})) as (env, it):
+        close, pulls = np.array([[0.0] * 7 + [-1.0]]), []
+        for step in range(100):
+            env.step(close)
+            if step >= 80:
+                pulls.append(it.pads.force[0, 0])
+        assert env.families.facts(0)["it"]["pads"]["hand"]["stage"] == "holding"
+        found = it.balance(ALL)
+        assert np.abs((found.now - found.begun - found.received + found.given)[:, :3]).max() < 1e-9
+        assert np.mean(pulls) == pytest.approx(it.mass(0) * 9.81, rel=0.1)
+        snapshot = env.snapshot()
+        env.step(close)
+        expected = it.x.copy()
+        env.reset(seed=5)
+        env.reset_to(snapshot)
+        env.step(close)
+        assert np.array_equal(it.x, expected)
+        held, along = (env.families.state("it").fields[key][0] for key in ("held", "along"))
+        assert held.sum() == 1
+        assert np.allclose(along, np.linspace(0.0, 0.2, 9))
+        for _ in range(40):
+            env.step(-close)
+        assert not env.families.state("it").fields["held"].any()
+        assert it.x[..., 2].max() < tool[2] - 0.1

@@ -1,0 +1,1 @@
+"""Lead a cable around two posts."""

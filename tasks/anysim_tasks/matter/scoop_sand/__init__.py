@@ -1,0 +1,1 @@
+"""Scoop sand out of a tray into a bowl."""
