@@ -4,7 +4,8 @@
 
 The figures of the models are those of docs/models.json and docs/model_contacts.json, which `python
 benchmarks/models.py FOLDER... --json` and `python benchmarks/model_contacts.py FOLDER... --json` write, those of drafts
-of docs/drafts.json, which `python benchmarks/drafts.py` writes. `--check` writes nothing and exits with 1 if the page
+of docs/drafts.json, which `python benchmarks/drafts.py` writes, those of round trips of docs/usd_round_trip.json, which
+`python benchmarks/usd_round_trip.py --json` writes. `--check` writes nothing and exits with 1 if the page
 has drifted from the code.
 """
 
@@ -17,6 +18,7 @@ from generated import ROOT, main
 
 from anysim_mujoco.mjcf import coverage as mjcf
 from anysim_urdf import coverage as urdf, sdf_coverage as sdf
+from anysim_usd import coverage as usd
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 
@@ -89,6 +91,18 @@ def drafts() -> str:
     return "\n".join(lines)
 
 
+def round_trips() -> str:
+    """The robots that were written as USD and read again: the largest differences of each kind, over all of them."""
+    rows = json.loads((ROOT / "docs/usd_round_trip.json").read_text("utf-8"))
+    kinds = list(rows[0]["exact"])
+    lines = [f"| {len(rows)} robots | " + " | ".join(kinds) + " |", "|---" * (1 + len(kinds)) + "|"]
+    for what, words in (("exact", "as anysim reads them"), ("plain", "by the attributes of others alone")):
+        lines.append(
+            f"| {words} | " + " | ".join(f"{max(row[what][kind] for row in rows):.0e}" for kind in kinds) + " |"
+        )
+    return "\n".join(lines)
+
+
 def package_of(uri: str) -> str:
     """The distribution that a file of the drafts comes with."""
     scheme, _, rest = uri.partition(":")
@@ -114,8 +128,8 @@ def cell(words: str, longest: int = 200) -> str:
 
 
 if __name__ == "__main__":
-    tables = {"URDF": urdf.rows, "SDF": sdf.rows, "MJCF": mjcf.rows}
+    tables = {"URDF": urdf.rows, "SDF": sdf.rows, "MJCF": mjcf.rows, "USD": usd.rows}
     contents: dict[str, Callable[[], str]] = {name: lambda rows=rows: table(rows()) for name, rows in tables.items()}
-    contents |= {"models": models, "contacts": contacts, "drafts": drafts}
+    contents |= {"models": models, "contacts": contacts, "drafts": drafts, "round-trips": round_trips}
     page = ("docs/importing.md",)
     sys.exit(max(main(__doc__, name, "importing_table.py", page, content) for name, content in contents.items()))

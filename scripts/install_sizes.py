@@ -34,6 +34,7 @@ WORDS = {
     "cameras": "cameras that fly: their motion and aim, and skills that take views",
     "client": "`anysim.connect`: envs that a service steps, and pools of services; no engine needed",
     "collect": "`anysim run`: episodes by scripted solutions, and reports of them",
+    "colliders": "what meshes collide as: convex pieces, primitives, triangles",
     "control": "tools by inverse kinematics and operational space, vehicles, hands",
     "evaluation": "`anysim evaluate`, `anysim benchmark`: how often policies solve tasks, and whether engines agree",
     "export": "`anysim export`: recorded runs as data sets of LeRobot, robomimic, RLDS and webdataset; `anysim tape`",
@@ -70,6 +71,7 @@ WORDS = {
     "tasks": "tasks on tables, with tight fits, hands, mobile bases and legs, with their experts",
     "teleop": "`anysim teleop`: demonstrations, driven by an input device",
     "urdf": "URDF files",
+    "usd": "USD files as robots, objects and worlds, and worlds as USD files: with usd-core",
     "viewer": "`anysim view`: tasks, worlds and recordings in a browser, on any engine; `anysim run --view`",
 }
 """What each extra brings; the table has a row for each."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from anysim.model.world import World
 
 ROOT = Path(__file__).parents[1]
-OWN_LEFTOVERS = frozenset({".pytest_cache", ".hypothesis", ".cache", "__pycache__"})
+OWN_LEFTOVERS = frozenset({".pytest_cache", ".hypothesis", ".cache", ".ruff_cache", "__pycache__"})
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -45,11 +45,32 @@ COMPILING = (
 """Tests for which numba compiles most of the kernels in a new checkout, each of them other ones."""
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+LONGEST = "tests/tasks/test_experts.py"
+"""Its tests take longest: as the last ones of a run they would leave one worker alone with them."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What is imported meanwhile stays: nothing is looked for that could be freed."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> Generator[None, object, object]:
     """Those that compile go first, one to each worker: what is compiled is there for all that comes after."""
+    found = config.stash.setdefault(_COLLECTED, set())
+    for item in items:  # those of other tiers too, which are left out below
+        name = getattr(item, "originalname", item.name)
+        found.add((item.location[0], name, frozenset(mark.name for mark in item.iter_markers())))
+    result = yield
     turn = {f"tests/{name}": number for number, name in enumerate(COMPILING)}
-    items.sort(key=lambda item: turn.get(item.nodeid, len(turn)))
+    late = len(turn)
+    items.sort(key=lambda item: turn.get(item.nodeid, late + (not item.nodeid.startswith(LONGEST))))
+    return result
 
 
 @pytest.hookimpl(trylast=True)
@@ -76,6 +97,13 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, None, None]:
 
 
 _BEFORE = pytest.StashKey[frozenset[str]]()
+_COLLECTED = pytest.StashKey[set[tuple[str, str, frozenset[str]]]]()
+
+
+@pytest.fixture(scope="session")
+def marks_of_tests(pytestconfig: pytest.Config) -> frozenset[tuple[str, str, frozenset[str]]]:
+    """File, name and marks of each test that this session has found, run or not."""
+    return frozenset(pytestconfig.stash[_COLLECTED])
 
 
 def _listing() -> frozenset[str]:

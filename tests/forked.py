@@ -16,11 +16,12 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 from select import select
 from types import ModuleType
 from typing import NamedTuple, NoReturn, TypedDict
@@ -30,6 +31,11 @@ LOADED = tuple(
     "pydantic rich.traceback scipy.ndimage scipy.spatial trimesh typer typer.main typer.rich_utils yaml".split()
 )
 """No package that keeps state between its uses, starts threads when it is imported, or chooses plugins."""
+OURS = tuple(
+    "anysim_schemas anysim anysim_collect anysim_control anysim_inspect anysim_mcap anysim_mujoco anysim_recording "
+    "anysim_skills anysim_urdf".split()
+)
+"""Packages all of whose modules are loaded: to import one does nothing else, which tests/imports holds."""
 
 
 class Asked(TypedDict):
@@ -103,15 +109,27 @@ def _end(server: Server) -> None:
 
 def _serve() -> None:
     """Load the libraries, and fork for each request."""
-    for name in LOADED:
+    for name in (*LOADED, *(module for package in OURS for module in _modules(package))):
         with suppress(ImportError):
             import_module(name)
+    with suppress(ImportError):
+        import_module("numba").njit(lambda: 0)()  # the first kernel loads half of numba
     gc.freeze()  # what is loaded is shared by all runs: a collection that looks at it would copy it
     while line := sys.stdin.buffer.readline():
         child = os.fork()
         if child == 0:
             _be(json.loads(line))
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
+def _modules(package: str) -> Iterator[str]:
+    """A package and all that is in it but tests and programs."""
+    yield package
+    with suppress(ImportError):
+        inside = import_module(package).__path__
+        for found in walk_packages(inside, f"{package}."):
+            if not {"testing", "__main__"} & {*found.name.split(".")}:
+                yield found.name
 
 
 def _be(asked: Asked) -> NoReturn:

@@ -39,8 +39,10 @@ KINDS: Mapping[str, str] = {
     "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
     "scenes": "readers of whole scene files as worlds, by file format",
+    "model_writers": "writers of models as files of other programs, by file format",
     "oracles": "independent readers of robots that importers are held against, by file format",
     "assets": "builders of procedural assets",
+    "colliders": "makers of collision geometry from meshes, other than their hulls",
     "layouts": "proposers of layouts",
     "rooms": "builders of rooms",
     "terrains": "builders of generated ground",
@@ -76,6 +78,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     },
     "anysim-client": {"clients": "http https"},
     "anysim-collect": {"commands": "counterfactual report run"},
+    "anysim-colliders": {"colliders": "decompose mesh primitives"},
     "anysim-control": {
         "controllers": "ackermann_drive batched_ik differential_drive differential_ik"
         " gripper_multi_finger holonomic_drive mink_ik operational_space pd pink_ik planar_drive",
@@ -110,6 +113,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},
     "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
     "anysim-urdf": {"importers": "sdf urdf world xacro", "scenes": "sdf world"},
+    "anysim-usd": {"importers": "usd usda usdc usdz", "model_writers": "usd", "scenes": "usd usda usdc usdz"},
     "anysim-viewer": {"commands": "view", "views": "page"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {

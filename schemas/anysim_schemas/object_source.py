@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
 from anysim_schemas.base import Length, Name, Scale, Spec
+from anysim_schemas.collision_shapes import COLLISION, CollisionShapesSpec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.plugin import PluginSlot
 from anysim_schemas.values import TAG_PREFIX, Choice, Range
@@ -24,8 +25,9 @@ class SourceSpec(Spec):
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        *((shape, "scale") for shape in SHAPES[:-2]),
-        ("asset", "packages", "scale"),
+        *((shape, "scale") for shape in SHAPES[:-3]),
+        ("mesh", "scale", "collision"),
+        ("asset", "packages", "scale", "collision"),
         ("procedural", "params", "scale"),
     )
 
@@ -35,7 +37,9 @@ class SourceSpec(Spec):
     capsule: tuple[Length, Length] | None = Field(
         default=None, description="radius, length of the straight part along z [m]"
     )
-    mesh: str | None = Field(default=None, description="URI of a mesh file; collides as its convex hull")
+    mesh: str | None = Field(
+        default=None, description="URI of a mesh file; collides as its convex hull unless `collision` says otherwise"
+    )
     asset: str | None = Field(default=None, description=ASSET)
     packages: dict[str, str] = Field(default_factory=dict, description=PACKAGES)
     procedural: str | None = Field(
@@ -45,6 +49,7 @@ class SourceSpec(Spec):
         default_factory=dict, description="parameters owned by the builder"
     )
     scale: Scale = Field(default=1.0, description="scale of this source; the object's own `scale` multiplies it")
+    collision: CollisionShapesSpec | None = Field(default=None, description=COLLISION)
 
     @classmethod
     def from_text(cls, text: str) -> dict[str, Any]:
@@ -68,6 +73,8 @@ class SourceSpec(Spec):
             raise KeyFault("`params` are for the builder that `procedural` names", "params")
         if self.packages and self.asset is None:
             raise KeyFault("`packages` are for the URDF that `asset` names", "packages")
+        if self.collision is not None and self.mesh is None and self.asset is None:
+            raise KeyFault("`collision` is for meshes, of the files that `mesh` and `asset` name", "collision")
         return self
 
 
@@ -80,11 +87,12 @@ class SourceChoice(Choice[SourceSpec]):
 class SourceFolder(Spec):
     """One of the files of a folder, each equally likely, drawn anew in each episode."""
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("folder", "pattern", "scale", "shared"),)
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("folder", "pattern", "scale", "collision", "shared"),)
 
     folder: str = Field(description="URI of a folder: relative to this file, or such as `package:my_assets/mugs`")
     pattern: str = Field(default="*", description="which files of it, such as `*.obj` or `*/model.urdf`")
     scale: Scale = Field(default=1.0, description="scale of each of them")
+    collision: CollisionShapesSpec | None = Field(default=None, description=COLLISION)
     shared: Name | None = Field(default=None, description="fields that share a name share one draw in each episode")
 
     @model_validator(mode="after")

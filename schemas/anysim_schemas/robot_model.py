@@ -5,6 +5,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from anysim_schemas.base import Flag, Length, Name, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.collision_shapes import CollisionShapesSpec
+from anysim_schemas.errors import KeyFault
 from anysim_schemas.object_source import PACKAGES
 from anysim_schemas.objects import ContactSpec
 from anysim_schemas.sensors import SensorNoiseSpec
@@ -195,6 +197,11 @@ class RobotModelSpec(Spec):
         description="links that collide with these solids instead of what the source says, which may be nothing, or a "
         "mesh whose convex hull fills what should be hollow",
     )
+    collision_shapes: CollisionShapesSpec | None = Field(
+        default=None,
+        description="what the meshes of the source and of the parts collide as: hull, decompose or primitives; links "
+        "that `collision` names have its solids",
+    )
     surfaces: tuple[SurfaceSpec, ...] = Field(default=(), description="contact parameters of links")
     self_collision: Flag = Field(default=False, description="whether links of this robot collide with each other")
     self_collision_exclusions: tuple[Annotated[tuple[str, str], Field()], ...] = Field(
@@ -204,3 +211,10 @@ class RobotModelSpec(Spec):
         default=True,
         description="the robot's own controller cancels its weight; never of one that stands on the ground",
     )
+
+    @model_validator(mode="after")
+    def _moves(self) -> "RobotModelSpec":
+        if self.collision_shapes is not None and self.collision_shapes.method == "mesh":
+            text = "triangles are for what is fixed, and a robot's links move; say `decompose`, or leave it out"
+            raise KeyFault(text, "collision_shapes.method")
+        return self

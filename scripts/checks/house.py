@@ -26,6 +26,7 @@ LARGE_PLUGINS = {
     "parity": 3_660,  # one comparison: its layers and probes are read together, and its page shows all of them
     "sensors": 4_000,  # one geometry and every sensor that asks it: kernels, tables, and what worlds declare
     "skills": 10_060,  # one library of arms and phases that every group of skills builds on, a folder a group
+    "usd": 3_600,  # the reader and the writer of one format, which share the attributes that carry every digit
 }
 """Plugins that stay whole although they are larger, with what they may have: it rises with what they newly do alone."""
 

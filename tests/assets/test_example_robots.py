@@ -17,6 +17,7 @@ from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.frames import find_frame
 from anysim.model.world import BodyKind, EntityKind, MeshShape, World
 from anysim_urdf.load import import_urdf
+from tests.tiers import often
 
 pytestmark = pytest.mark.xdist_group("example robots")  # one worker imports them, once, for all tests
 
@@ -34,7 +35,11 @@ ROBOTS = {  # path: moving joints, followers, mass [kg]
 }
 
 
-@pytest.fixture(scope="module", params=ROBOTS)
+LARGE = ("talos_data/robots/talos_reduced.urdf", "baxter_description/urdf/baxter.urdf")
+"""Those whose meshes take longest."""
+
+
+@pytest.fixture(scope="module", params=often(ROBOTS.keys() - set(LARGE), ROBOTS))
 def robot(request: pytest.FixtureRequest) -> tuple[str, ImportedModel]:
     root = example_robot_data()
     return request.param, import_urdf(root / request.param, root=root)

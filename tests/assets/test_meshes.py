@@ -69,13 +69,28 @@ def test_3mf_has_a_unit_and_stays_within_its_package(folder: Path) -> None:
     np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), np.array((0.2, 0.4, 0.6)) * 25.4, atol=1e-6)
     hull = meshes.collision_mesh(changed("plain.3mf", b' unit="millimeter"', b""))
     np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), (0.2, 0.4, 0.6), atol=1e-6)
-    with pytest.raises(AssetError, match=r"its unit is 'cubit'; the units of a .3mf are micron, millimeter"):
+    with pytest.raises(AssetError, match=r"its unit is 'cubit'; the units of a \.3mf are micron, millimeter"):
         meshes.collision_mesh(changed("cubit.3mf", b'unit="millimeter"', b'unit="cubit"'))
     with pytest.raises(AssetError, match="made of other objects"):
         meshes.collision_mesh(changed("nested.3mf", b"<mesh>", b"<components/><mesh>"))
     (folder / "broken.3mf").write_bytes(path.read_bytes()[:-40])
     with pytest.raises(AssetError, match="cannot be read as a mesh"):
         meshes.collision_mesh(folder / "broken.3mf")
+    with zipfile.ZipFile(folder / "damaged.3mf", "w", zipfile.ZIP_DEFLATED) as package:
+        package.writestr("3D/3dmodel.model", b"<model>" * 1000)
+    whole = bytearray((folder / "damaged.3mf").read_bytes())
+    whole[50:56] = b"\xff" * 6  # inside of what is compressed
+    (folder / "damaged.3mf").write_bytes(whole)
+    with pytest.raises(AssetError, match="cannot be read as a mesh: Error -3 while decompressing"):
+        meshes.collision_mesh(folder / "damaged.3mf")
+
+
+def test_triangles_of_vertices_that_are_not_there_are_refused(folder: Path) -> None:
+    data = write(folder / "box.glb", trimesh.creation.box((0.2, 0.4, 0.6))).read_bytes()
+    first = 28 + int.from_bytes(data[12:16], "little")  # of the indices, behind the JSON
+    (folder / "wrong.glb").write_bytes(data[:first] + (99).to_bytes(4, "little") + data[first + 4 :])
+    with pytest.raises(AssetError, match="a triangle has vertex 99 of"):
+        meshes.collision_mesh(folder / "wrong.glb")
 
 
 def test_buffers_of_a_gltf_lie_in_its_folder(folder: Path) -> None:

@@ -60,6 +60,15 @@ def test_a_path_cannot_leave_its_root_by_a_link(tmp_path: Path) -> None:
         locate("cup.stl", base=base)
 
 
+def test_a_loop_of_links_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "loop.urdf").symlink_to(tmp_path / "loop.urdf")
+    for uri in ("loop.urdf", f"{tmp_path}/loop.urdf"):
+        with pytest.raises(AssetError, match="loop"):
+            locate(uri, base=tmp_path)
+    with pytest.raises(AssetError, match="loop"):
+        locate_folder("loop.urdf", base=tmp_path)
+
+
 def test_packages_cannot_be_left() -> None:
     with pytest.raises(AssetError, match="leaves its root"):
         locate("example-robot-data:../../../../etc/passwd")

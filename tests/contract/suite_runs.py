@@ -3,9 +3,10 @@
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+from tests import forked
 
 HERE = Path(__file__).parent
 
@@ -14,10 +15,7 @@ def run(*words: str, folder: Path | None = None) -> subprocess.CompletedProcess[
     """`python words` in a folder, with the tests importable."""
     paths = [str(HERE.parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    command = [sys.executable, *words]
-    return subprocess.run(
-        command, capture_output=True, text=True, timeout=300, env=environment, cwd=folder, check=False
-    )
+    return forked.run(*words, cwd=folder, env=environment)
 
 
 def outcomes_of(suite: str, module: str, jobs: Mapping[str, Sequence[str]], folder: Path) -> dict[str, dict[str, str]]:

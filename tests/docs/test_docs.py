@@ -56,8 +56,17 @@ def test_an_example_runs(path: Path, tmp_path: Path) -> None:
     run([str(path)], tmp_path)
 
 
+LONG = {f"docs/{name}.md" for name in ("agents", "banks", "counterfactuals", "fields", "navigation")}
+"""Pages with a block that takes three seconds or more: theirs are run in the slow tier."""
+
+
 @pytest.mark.parametrize(
-    ("where", "code"), blocks("python"), ids=lambda v: v if ":" in v[:60] and "\n" not in v else "code"
+    ("where", "code"),
+    [
+        pytest.param(where, code, marks=[pytest.mark.slow] if where.partition(":")[0] in LONG else [])
+        for where, code in blocks("python")
+    ],
+    ids=lambda v: v if ":" in v[:60] and "\n" not in v else "code",
 )
 def test_a_block_of_python_runs(where: str, code: str, tmp_path: Path) -> None:
     run(["-c", code], tmp_path)

@@ -12,7 +12,8 @@ from anysim.testing.engines import require_engine
 ALL = sorted((Path(__file__).parents[2] / "docs" / "worlds").glob("*.yaml"))
 WORLDS = [path for path in ALL if path.stem != "fifteen_families"]
 """Those that the kinematic engine runs too; the other one has tests of its own."""
-ENGINES = ("mujoco", "pybullet", "sapien")
+BIG = {"mujoco": ("team",), "pybullet": ("team", "thousand"), "sapien": ("thousand",)}
+"""The engines, and for each the large worlds that the slow tier tries on it."""
 
 
 def start(world: Path, engine: str, num_envs: int = 2) -> dict[str, np.ndarray]:
@@ -29,8 +30,14 @@ def start(world: Path, engine: str, num_envs: int = 2) -> dict[str, np.ndarray]:
         return {"presence": env.engine.presence, "pose": pose, "later": later.body_pose.copy()}
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("world", WORLDS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    ("world", "engine"),
+    [
+        pytest.param(path, engine, id=f"{path.stem}-{engine}", marks=[pytest.mark.slow] if path.stem in slow else [])
+        for path in WORLDS
+        for engine, slow in BIG.items()
+    ],
+)
 def test_a_world_runs_on_every_engine_that_declares_it_can(world: Path, engine: str) -> None:
     require_engine(engine)
     try:

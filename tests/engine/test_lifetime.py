@@ -89,7 +89,13 @@ def test_an_engine_whose_construction_failed_is_dropped_in_silence() -> None:
     gc.collect()  # an error in __del__ would be a warning, which is an error here
 
 
-@pytest.mark.parametrize(("engine", "shards"), [*((name, 1) for name in runnable()), ("null", 2)])
+@pytest.mark.parametrize(
+    ("engine", "shards"),
+    [
+        *((name, 1) if name == "mujoco" else pytest.param(name, 1, marks=pytest.mark.slow) for name in runnable()),
+        ("null", 2),
+    ],
+)
 def test_a_forked_copy_says_at_once_what_it_is(engine: str, shards: int) -> None:
     """And a fork makes envs of its own, ends as programs do, and leaves those of its parent alone."""
     command = [sys.executable, "-m", "tests.engine.forks", engine, str(shards)]

@@ -112,6 +112,7 @@ def test_commands_of_every_observer_join(monkeypatch: pytest.MonkeyPatch) -> Non
     assert {"compare", "picture", "gallery"} <= {command.name for command in app.registered_commands}
 
 
+@pytest.mark.slow
 def test_the_program_that_measures_starts_measures_both() -> None:
     program = Path(__file__).parents[2] / "benchmarks" / "startup.py"
     command = [sys.executable, str(program), "--rounds", "1"]

@@ -159,6 +159,7 @@ def test_snapshots_and_shards_have_the_lens_and_the_light(engine: str) -> None:
         assert np.array_equal(env.engine.camera_fov("side"), before[1])
 
 
+@pytest.mark.slow
 def test_images_do_not_depend_on_shards() -> None:
     with studio("pybullet", 4, "engine.shards=2") as two, studio("pybullet", 4) as one:
         a, b = started(two)["images/top"], started(one)["images/top"]

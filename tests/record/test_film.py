@@ -30,6 +30,7 @@ from anysim.testing.engines import require_drawing
 from anysim_inspect.cli.check import report_on
 from anysim_inspect.verify import verify
 from anysim_recording.collector import Collector, run_header
+from tests.tiers import often
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 CAMERAS = ("front", "wrist")
@@ -85,7 +86,7 @@ def assert_filmed(env: TaskEnv, index: int, live: list[dict[str, Any]], row: int
             assert np.array_equal(drawn[camera], images[camera][row]), f"{camera}, step {step}"
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", often(["mujoco"], ENGINES))
 def test_images_of_a_finished_episode_are_those_of_the_episode(engine: str) -> None:
     """In the env that it ran in, and in another one that begins it and never moves, over three episodes."""
     with filmed_env(engine, 3) as env, filmed_env(engine, 1) as other:
@@ -265,11 +266,8 @@ list(collected(Path(sys.argv[1]), "mujoco"))
 """
 
 
-@pytest.mark.parametrize(
-    "image",
-    [pytest.param(1, marks=pytest.mark.slow), 13, pytest.param(24, marks=pytest.mark.slow)],
-    ids=lambda number: f"image {number}",
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("image", [1, 13, 24], ids=lambda number: f"image {number}")
 def test_kill_while_a_film_is_drawn(image: int, tmp_path: Path) -> None:
     """Of eight images in each episode: what is there is whole, and the next run sweeps the rest and completes it."""
     root = Path(__file__).parents[2]

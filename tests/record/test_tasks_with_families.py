@@ -1,4 +1,4 @@
-"""What families of a task tell a recording, it can hold."""
+"""Recordings of tasks with people and matter: what their families tell, a file can hold."""
 
 import pytest
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.model.shapes import is_ground
+from anysim.model.shapes import MeshShape, is_ground
 from anysim_pybullet.bullet import MOST_CLIENTS, bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.urdf import UNLIMITED
@@ -58,7 +58,8 @@ def _geom_volumes(env: Env) -> Array:
     volumes = np.zeros(len(env.plan.world.geoms))
     for number, (uid, link) in env.shape_at.items():
         index = int(env.plan.rules.geoms[number])
-        if is_ground(env.plan.world.geoms[index].shape):
+        shape = env.plan.world.geoms[index].shape
+        if is_ground(shape) or (isinstance(shape, MeshShape) and shape.concave):
             continue
         for shape in bullet().getCollisionShapeData(uid, link, physicsClientId=env.id):
             volumes[index] = _volume(shape[2], shape[3], env, uid, link)

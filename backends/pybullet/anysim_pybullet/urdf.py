@@ -107,7 +107,13 @@ def _inertial(world: World, frames: Frames, body: int) -> list[str]:
 
 def _collision(geom: Geom, anchor: Array, meshes: dict[str, Path]) -> list[str]:
     pose = np.array([*(np.array(geom.position) - anchor), *geom.quaternion])
-    return ["<collision>", _origin(pose), f"<geometry>{_shape(geom, meshes)}</geometry>", "</collision>"]
+    triangles = isinstance(geom.shape, MeshShape) and geom.shape.concave
+    return [
+        '<collision concave="yes">' if triangles else "<collision>",
+        _origin(pose),
+        f"<geometry>{_shape(geom, meshes)}</geometry>",
+        "</collision>",
+    ]
 
 
 def _shape(geom: Geom, meshes: dict[str, Path]) -> str:

@@ -3,7 +3,7 @@
 | URI | what is read |
 |---|---|
 | `…/arm.urdf`, `…/arm.xml` | the one robot or object that the file holds |
-| `…/scene.xml#left_arm` | of an MJCF file with several, the one whose first body is `left_arm` |
+| `…/scene.xml#left_arm` | of an MJCF, SDF or USD file with several, the one whose first body is `left_arm` |
 | `…/shelf.boards` | whatever the installed importer `boards` reads |
 """
 
@@ -24,14 +24,16 @@ from anysim_schemas.limits import MODEL_BYTES
 from anysim_schemas.object_source import PROCEDURAL
 
 _FORMATS = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}  # other endings are importers' names
-_WITH_BODY = re.compile(r"(robot_descriptions:\w+|.*\.(?:urdf|xml|mjcf|sdf|world))#(.+)", re.IGNORECASE | re.DOTALL)
+_WITH_BODY = re.compile(
+    r"(robot_descriptions:\w+|.*\.(?:urdf|xml|mjcf|sdf|world|usd[acz]?))#(.+)", re.IGNORECASE | re.DOTALL
+)
 """A `#` inside of a path is none that names a body."""
 
 
 class ModelFile(NamedTuple):
     """A file that holds a model, the folder that no reference in it may leave, its format, and the body that is meant.
 
-    `kind` is the name of its importer. `body` is empty where the whole file is meant, as it is of all but MJCF and SDF.
+    `kind` is the name of its importer. `body` is empty where the whole file is meant, as of all but MJCF, SDF and USD.
     """
 
     path: Path

@@ -7,7 +7,7 @@ parameters, never of the result, so that it is equal on all machines.
 import io
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import islice
 from math import inf, nan
@@ -21,7 +21,7 @@ from anysim import cache
 from anysim.assets.bounded_files import bounded, check, mesh_bytes, plain_xml
 from anysim.conventions import Array
 from anysim.errors import AssetError
-from anysim.geometry.triangles import FEW, convex_hull, decimated
+from anysim.geometry.triangles import FEW, convex_hull, decimated, enclosed_volume
 from anysim.math import matrix as M
 from anysim.model.world import Mesh, Vec3
 from anysim_schemas.limits import MESH_BYTES, MESH_FACES
@@ -37,6 +37,13 @@ _UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254
 _ONE: Vec3 = (1.0, 1.0, 1.0)
 Color = tuple[float, float, float, float]
 _units: dict[str, float] = {}
+
+
+class WholeMesh(NamedTuple):
+    """What a convex hull was made of. `volume` [m^3] is that inside of its triangles, NaN where they are not closed."""
+
+    volume: float
+    mesh: Callable[[], Mesh]
 
 
 class VisualPart(NamedTuple):
@@ -64,11 +71,39 @@ def collision_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> 
     key = _key(path, "hull", scale, upright, HULL_VERTICES)
 
     def make() -> dict[str, Array]:
-        points = np.concatenate([piece.vertices for piece in _load(path, scale, upright)])
-        vertices, faces = convex_hull(points, HULL_VERTICES)
+        pieces = _load(path, scale, upright)
+        _volume_of(key, lambda: _joined(pieces))
+        vertices, faces = convex_hull(np.concatenate([piece.vertices for piece in pieces]), HULL_VERTICES)
         return {"vertices": vertices, "faces": faces}
 
     return _mesh(path.stem, key, _arrays(key, make))
+
+
+def whole_of(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> WholeMesh:
+    """What `collision_mesh` made its hull of."""
+    key = _key(path, "hull", scale, upright, HULL_VERTICES)
+    volume = _volume_of(key, lambda: _joined(_load(path, scale, upright)))
+    return WholeMesh(volume, lambda: whole_mesh(path, scale, upright=upright))
+
+
+def whole_read(name: str, vertices: Array, faces: Array, source: str) -> WholeMesh:
+    """What `hull_of` made its hull of, with its triangles (F, 3)."""
+    key = cache.digest(_VERSION, "whole of", source)
+    arrays = {"vertices": np.asarray(vertices, dtype=float), "faces": np.asarray(faces)}
+    return WholeMesh(_volume_of(key, lambda: tuple(arrays.values())), lambda: _mesh(name, key, arrays))
+
+
+def _joined(pieces: Sequence[_Piece]) -> tuple[Array, ...]:
+    """The vertices (V, 3) and triangles (F, 3) of all pieces."""
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces[:-1])])
+    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=True)]
+    return np.concatenate([piece.vertices for piece in pieces]), np.concatenate(faces)
+
+
+def _volume_of(key: str, triangles: Callable[[], tuple[Array, ...]]) -> float:
+    """[m^3] that the triangles of a key enclose; NaN where they are not closed."""
+    key = cache.digest(key, "volume")
+    return float(_arrays(key, lambda: {"volume": np.array(enclosed_volume(*triangles()))})["volume"])
 
 
 def whole_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> Mesh:
@@ -76,10 +111,7 @@ def whole_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> Mesh
     key = _key(path, "whole", scale, upright)
 
     def make() -> dict[str, Array]:
-        pieces = _load(path, scale, upright)
-        starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces[:-1])])
-        faces = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts, strict=True)])
-        vertices = np.concatenate([piece.vertices for piece in pieces])
+        vertices, faces = _joined(_load(path, scale, upright))
         joined = decimated(vertices, faces, 0.0)
         return {"vertices": joined[0], "faces": joined[1]}
 
@@ -225,7 +257,10 @@ def _files_beside(path: Path, data: bytes) -> list[Path]:
     except (ValueError, AttributeError, RecursionError) as error:
         raise AssetError(f"{path}: cannot be read as a mesh: {error}") from error
     here = path.parent.resolve()
-    files = [(here / unquote(name)).resolve() for name in asked if not name.startswith("data:")]
+    try:
+        files = [(here / unquote(name)).resolve() for name in asked if not name.startswith("data:")]
+    except (ValueError, RuntimeError, OSError) as error:  # no name of a file, or a loop of symbolic links
+        raise AssetError(f"{path}: a buffer cannot be found: {error}") from error
     for file in files:
         if not file.is_relative_to(here):
             raise AssetError(f"{path}: a buffer lies outside of its folder: {file}")
@@ -273,6 +308,8 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
             total += len(faces)
             check(path, MESH_FACES, total)  # a geometry may be there many times
             if len(faces):
+                if faces.min() < 0 or faces.max() >= len(geometry.vertices):
+                    raise ValueError(f"a triangle has vertex {faces.max()} of {len(geometry.vertices)}")
                 vertices = M.product(np.asarray(geometry.vertices, dtype=float), matrix[:3, :3].T) + matrix[:3, 3]
                 mirrored = M.determinant(matrix[:3, :3]) < 0
                 pieces.append(

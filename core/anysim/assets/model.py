@@ -12,6 +12,7 @@ from math import isinf, isnan
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
+from anysim.assets.meshes import WholeMesh
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.model.affordances import Affordance
 from anysim.model.frames import FixedFrame
@@ -96,7 +97,8 @@ class ImportedModel:
       of the lumped link is a Site with the link's name. `links` maps every link name of the source, lumped or not, to
       its body, and `geom_links` tells for each geom the link it was on in the source.
     - Collision geoms have `collides` set; visual ones have `visible` set and do not collide. A mesh that collides holds
-      its convex hull. `meshes` have a `hash` of source bytes and processing, names unique within the model.
+      its convex hull, and `wholes` has what each hull was made of. `meshes` have a `hash` of source bytes and
+      processing, names unique within the model.
     - `mimic` inside joints, tendons, constraints, `excluded_pairs` and hints use local indices.
     """
 
@@ -119,6 +121,7 @@ class ImportedModel:
     constraints: tuple[Constraint, ...] = ()
     spatial_tendons: tuple[SpatialTendon, ...] = ()
     sensors: tuple[SensorHint, ...] = ()
+    wholes: Mapping[str, WholeMesh] = field(default_factory=dict)
 
     def drive_of(self, joint: int) -> ActuatorHint | None:
         """The drive that the source declares for a joint; None where it declares none, or several."""

@@ -32,7 +32,7 @@ from anysim_schemas.limits import MODEL_BYTES
 
 EXAMPLE_ROBOT_DATA = "example-robot-data"
 SCHEMES = (EXAMPLE_ROBOT_DATA, "package", "robot_descriptions", "file")
-_MODEL_FOLDERS = frozenset({"urdf", "robots", "xml", "mjcf", "xacro"})
+_MODEL_FOLDERS = frozenset({"urdf", "robots", "xml", "mjcf", "xacro", "usd"})
 _SEARCHED = 5000  # files looked at for a near name in an error message
 Folders = dict[str, list[tuple[Path, Path]]]
 """Of packages by name: what no file of it may leave, and a folder where it may lie."""
@@ -108,7 +108,7 @@ def _parts(what: str, uri: str) -> tuple[str, str]:
 
 def _folder_inside(root: Path, rest: str, uri: str) -> AssetFile:
     root = root.resolve()
-    resolved = (root / rest).resolve()
+    resolved = _resolved(root / rest, f"folder '{uri}'")
     if not resolved.is_relative_to(root):
         raise AssetError(f"folder '{uri}' leaves its root {root}: it would be {resolved}")
     if not resolved.is_dir():
@@ -231,10 +231,17 @@ def _package_name(folder: Path) -> str:
     return named[1].decode() if named else ""
 
 
+def _resolved(path: Path, what: str) -> Path:
+    try:
+        return path.resolve()
+    except (RuntimeError, OSError) as error:  # of Python before 3.13: a loop of symbolic links
+        raise AssetError(f"{what} cannot be found: {error}") from error
+
+
 def _inside(root: Path, rest: str, uri: str) -> AssetFile:
     root = root.resolve()
     path = root / rest
-    resolved = path.resolve()
+    resolved = _resolved(path, f"asset '{uri}'")
     if not resolved.is_relative_to(root):
         how = "through '..'" if ".." in Path(rest).parts else "through a symbolic link or an absolute path"
         raise AssetError(f"asset '{uri}' leaves its root {root} {how}: it would be {resolved}")
@@ -291,7 +298,7 @@ def _folder_root(folder: Path) -> Path:
     """The root of an asset given by an absolute path.
 
     The nearest folder with a package.xml, else the file's own folder, or the one above where that is called urdf,
-    robots, xml, mjcf or xacro (meshes then lie in a folder beside it).
+    robots, xml, mjcf, xacro or usd (meshes then lie in a folder beside it).
     """
     for candidate in (folder, *folder.parents):
         if (candidate / "package.xml").is_file():

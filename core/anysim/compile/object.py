@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from anysim.assets.collision_shapes import with_collision
 from anysim.assets.load import import_asset
-from anysim.assets.meshes import collision_mesh, visual_parts
+from anysim.assets.meshes import WholeMesh, collision_mesh, visual_parts, whole_of
 from anysim.assets.model import ImportedModel, ImportNote, noted
 from anysim.assets.procedural import build
 from anysim.assets.uri import locate
@@ -154,30 +155,53 @@ def _model(
         model = import_asset(
             source.asset, base=base, scale=source.scale, packages=source.packages, visual_error=visual_error
         )
-        return _asset(spec, source, model, touch, color, issues, key)
+        return _asset(spec, source, _collided(model, spec, source), touch, color, issues, key)
     if source.procedural is not None:
         model = build(source.procedural, source.params, scale=source.scale)
         return _asset(spec, source, model, touch, color, issues, key)
     meshes: dict[str, Mesh] = {}
+    wholes: dict[str, WholeMesh] = {}
     if source.mesh is None:
         solid = _primitive(source)
         geoms = [Geom("shape", 0, solid, color=(*color, 1.0), surface=touch, collides=spec.collides)]
     else:
-        geoms, solid = _mesh_geoms(spec, source, touch, color, meshes, base, visual_error)
+        geoms, solid = _mesh_geoms(spec, source, touch, color, meshes, wholes, base, visual_error)
     if problem := size_problem(solid, meshes):
         issues.add(key, problem)
         return None
     if inertia.volume(solid, meshes) <= 0:
         issues.add(key, "the mesh encloses no volume, so it cannot have a mass")
         return None
-    body = Body("", BodyKind.FREE, inertial=_inertial(spec, solid, meshes))
+    massive = dict(meshes)
+    if wholes and source.collision is not None and source.collision.method != "hull":
+        for name, whole in wholes.items():  # the mass of what is there, if it is closed, and not of its hull
+            mesh = whole.mesh()
+            outward = replace(mesh, faces=mesh.faces[:, ::-1])  # of one whose triangles face inward
+            closed = [{name: one} for one in (mesh, outward) if inertia.volume(MeshShape(name), {name: one}) > 0]
+            massive |= closed[0] if whole.volume > 0 and closed else {}
+    body = Body("", BodyKind.FREE, inertial=_inertial(spec, solid, massive))
     if not spec.fixed and (problem := inertial_problem(body.inertial)):
         issues.add("mass" if spec.mass is not None else "density" if spec.density is not None else key, problem)
         return None
-    links = {"": 0}
-    return ImportedModel(
-        name, (body,), geoms=tuple(geoms), geom_links=("",) * len(geoms), meshes=tuple(meshes.values()), links=links
+    model = ImportedModel(
+        name,
+        (body,),
+        geoms=tuple(geoms),
+        geom_links=("",) * len(geoms),
+        meshes=tuple(meshes.values()),
+        links={"": 0},
+        wholes=wholes,
     )
+    return _collided(model, spec, source)
+
+
+def _collided(model: ImportedModel, spec: ObjectSpec, source: SourceSpec) -> ImportedModel:
+    """The model with the collision geometry of its source."""
+    if source.collision is not None and source.collision.method == "mesh" and not spec.fixed:
+        raise AssetError(
+            f"'{source_name(source)}': `collision: mesh` is for what is fixed; set `fixed: true`, or say `decompose`"
+        )
+    return with_collision(model, source.collision)
 
 
 def _primitive(source: SourceSpec) -> Shape:
@@ -205,6 +229,7 @@ def _mesh_geoms(
     touch: Surface,
     color: Rgb,
     meshes: dict[str, Mesh],
+    wholes: dict[str, WholeMesh],
     base: Path | None,
     visual_error: float,
 ) -> tuple[list[Geom], Shape]:
@@ -213,7 +238,7 @@ def _mesh_geoms(
     scale = (source.scale, source.scale, source.scale)
     hull = collision_mesh(path, scale, upright=True)
     hull = replace(hull, name=f"{hull.name}_hull")
-    meshes[hull.name] = hull
+    meshes[hull.name], wholes[hull.name] = hull, whole_of(path, scale, upright=True)
     geoms = [Geom("hull", 0, MeshShape(hull.name), surface=touch, collides=spec.collides, visible=False)]
     for i, part in enumerate(visual_parts(path, scale, upright=True, error=visual_error)):
         meshes[part.mesh.name] = part.mesh

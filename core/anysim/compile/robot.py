@@ -1,6 +1,6 @@
 """Compilation of a robot by its catalogue entry."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import combinations
@@ -10,6 +10,7 @@ import numpy as np
 
 from anysim.assets.attach import attach
 from anysim.assets.catalogue import CatalogueEntry, load_robot, missing_source
+from anysim.assets.collision_shapes import with_collision
 from anysim.assets.load import import_asset
 from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportedModel, ImportNote, noted
@@ -57,7 +58,8 @@ def import_robot(entry: CatalogueEntry, visual_error: float = VISUAL_ERROR) -> I
     if spec.visual_error is not None:
         visual_error = spec.visual_error
     try:
-        model = _read(entry, spec.source, spec.params, visual_error, f"the source of robot '{spec.name}'")
+        own = spec.collision
+        model = _read(entry, spec.source, spec.params, visual_error, f"the source of robot '{spec.name}'", own)
         brought = [
             _read(entry, part.source, part.params, visual_error, f"the source of parts.{i} of robot '{spec.name}'")
             for i, part in enumerate(spec.parts)
@@ -76,14 +78,20 @@ def import_robot(entry: CatalogueEntry, visual_error: float = VISUAL_ERROR) -> I
 
 
 def _read(
-    entry: CatalogueEntry, source: str, params: Mapping[str, Any], visual_error: float, where: str
+    entry: CatalogueEntry,
+    source: str,
+    params: Mapping[str, Any],
+    visual_error: float,
+    where: str,
+    kept: Collection[str] = (),
 ) -> ImportedModel:
     """The model of one source of an entry."""
     try:
         if source.startswith(PROCEDURAL):
             return build(source.removeprefix(PROCEDURAL), params)
         more: Any = {"packages": entry.spec.packages, "visual_error": visual_error, "params": params}
-        return import_asset(source, base=entry.file.parent, **more)
+        model = import_asset(source, base=entry.file.parent, **more)
+        return with_collision(model, entry.spec.collision_shapes, kept)
     except SpecError as error:
         raise AssetError(f"{where} is not valid: {error}") from None
 

@@ -130,7 +130,7 @@ def _files(spec: SourceFolder, base: Path | None) -> list[SourceSpec]:
     return [
         SourceSpec.model_validate(
             SourceSpec.from_text(f"{spec.folder.rstrip('/')}/{path.relative_to(folder.path).as_posix()}")
-            | {"scale": spec.scale}
+            | {"scale": spec.scale, "collision": spec.collision}
         )
         for path in files
     ]

@@ -198,7 +198,9 @@ def _contacts(world: World, path: Mapping[int, str]) -> Iterator[tuple[str, str,
 def _of_geom(geom: Geom) -> Rows:
     mesh, surface = isinstance(geom.shape, MeshShape), geom.surface
     concave = isinstance(geom.shape, MeshShape) and geom.shape.concave
-    instead = "`kind: heightfield` with the same `file` is its heights seen from above"
+    thing = concave and isinstance(geom.shape, MeshShape) and geom.shape.bounded
+    seen = "`kind: heightfield` with the same `file` is its heights seen from above"
+    instead = "`collision: decompose` collides as convex pieces of it" if thing else seen
     return (
         (C.TERRAIN_PLANE, isinstance(geom.shape, Plane), "is a plane"),
         (C.TERRAIN_HEIGHTFIELD, isinstance(geom.shape, HeightFieldShape), "is a height field"),

@@ -57,6 +57,23 @@ def turned(across: Array, height: Array) -> tuple[Array, Array]:
     return vertices, np.concatenate([lower, upper])
 
 
+def enclosed_volume(vertices: Array, faces: Array) -> float:
+    """[m^3] inside of the triangles (F, 3) of vertices (V, 3); NaN where they are not closed, so that it has none.
+
+    Equal vertices are one. Each edge has as many triangles on its one side as on its other, turned the same way.
+    """
+    _, same = np.unique(np.asarray(vertices, dtype=float), axis=0, return_inverse=True)
+    corners = same.reshape(-1)[np.asarray(faces)].astype(np.int64)
+    there = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    edges = np.concatenate([corners[there][:, pair] for pair in ((0, 1), (1, 2), (2, 0))])
+    count = len(vertices)
+    forth, back = np.sort(edges[:, 0] * count + edges[:, 1]), np.sort(edges[:, 1] * count + edges[:, 0])
+    if not len(edges) or not np.array_equal(forth, back):
+        return float("nan")
+    a, b, c = np.moveaxis((vertices - vertices.mean(axis=0))[np.asarray(faces)[there]], 1, 0)
+    return abs(float((a * np.cross(b, c)).sum())) / 6
+
+
 _THINNEST = 1e-3  # [m] that a flat mesh is thickened to, along the direction in which it has no extent
 
 

@@ -53,11 +53,13 @@ class Cylinder:
 class MeshShape:
     """A mesh of the world by name; as a collision shape it is its convex hull.
 
-    A `concave` one collides triangle by triangle, and is ground: fixed to the world.
+    A `concave` one collides triangle by triangle, and is fixed: ground, or, where `bounded`, part of a static thing,
+    which has a size, and which is taken for its hull where triangles do not matter.
     """
 
     mesh: str
     concave: bool = False
+    bounded: bool = field(default=False, metadata=HASHED_IF_GIVEN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +74,9 @@ Shape = Plane | Box | Sphere | Capsule | Cylinder | MeshShape | HeightFieldShape
 
 def is_ground(shape: Shape) -> bool:
     """Whether a shape is a surface without a volume: it has no bounds or mass, and only what is fixed can have it."""
-    return isinstance(shape, Plane | HeightFieldShape) or (isinstance(shape, MeshShape) and shape.concave)
+    return isinstance(shape, Plane | HeightFieldShape) or (
+        isinstance(shape, MeshShape) and shape.concave and not shape.bounded
+    )
 
 
 def solid_moments(shape: Shape, mass: float) -> Vec3:

@@ -16,7 +16,7 @@ from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.shapes import is_ground
-from anysim.model.world import FAR, Body, BodyKind, Entity, Inertial, JointType, World
+from anysim.model.world import FAR, Body, BodyKind, Entity, Inertial, JointType, MeshShape, World
 
 CONFIGURATIONS = 20
 INERTIALS = ("body.mass", "body.com", "body.inertia")
@@ -97,7 +97,8 @@ def world_rows(world: World) -> list[AuditRow]:
         rows.append(AuditRow(actuator.name, "effort limit", (actuator.effort_limit,)))
     meshes = {mesh.name: mesh for mesh in world.meshes}
     for geom in world.geoms:
-        if geom.collides and not is_ground(geom.shape):
+        triangles = isinstance(geom.shape, MeshShape) and geom.shape.concave
+        if geom.collides and not is_ground(geom.shape) and not triangles:
             rows.append(AuditRow(geom.name, "volume", (inertia.volume(geom.shape, meshes),)))
             rows.append(AuditRow(geom.name, "friction", (geom.surface.friction,)))
     return rows

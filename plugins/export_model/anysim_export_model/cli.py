@@ -1,7 +1,7 @@
 """`anysim export-model`: robots, objects and worlds as files of other programs."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -16,7 +16,7 @@ def export_model(
             help="A robot or a task by name, the YAML file of a world or a robot, or a model file.",
         ),
     ],
-    to: Annotated[Literal["urdf", "mjcf"], typer.Option("--to", help="The format.")],
+    to: Annotated[str, typer.Option("--to", help="The format: urdf, mjcf, or that of an installed writer, as usd.")],
     out: Annotated[
         Path | None, typer.Option("--out", help="The folder of the files; default runs/models/NAME-FORMAT.")
     ] = None,
@@ -27,11 +27,11 @@ def export_model(
     force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not empty.")] = False,
     json: AsJson = False,
 ) -> None:
-    """Write a robot, an object or a world as URDF or MJCF files, with their meshes beside them.
+    """Write a robot, an object or a world as URDF, MJCF or USD files, with their meshes beside them.
 
-    MJCF takes a whole world: bodies, drives, lights, cameras, ground. A URDF is one tree, so that each entity of a
-    world gets a file, and an SRDF beside it for its groups, its home and the pairs that never collide. What the format
-    cannot hold is told, line by line.
+    MJCF and USD take a whole world: bodies, drives, lights, cameras, ground. A URDF is one tree, so that each entity of
+    a world gets a file, and an SRDF beside it for its groups, its home and the pairs that never collide. What the
+    format cannot hold is told, line by line.
 
     Examples:
       anysim export-model franka_panda --to urdf

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from anysim import registry
 from anysim.assets.model import ImportNote
 from anysim.errors import AnysimError, listing, suggest
 from anysim_export_model.mesh_files import MeshFiles
@@ -14,6 +15,7 @@ from anysim_export_model.scene import Piece, Scene
 from anysim_export_model.urdf import srdf, urdf
 
 FORMATS = ("urdf", "mjcf")
+"""Those that are written here; writers of others are plugins of the kind `model_writers`."""
 
 
 class ModelFiles(NamedTuple):
@@ -25,22 +27,29 @@ class ModelFiles(NamedTuple):
 
 
 def write(scene: Scene, kind: str, folder: Path, *, entities: tuple[str, ...] = ()) -> ModelFiles:
-    """Write a scene into a folder: one MJCF file, or a URDF file for each tree. Files that are there are replaced.
+    """Write a scene into a folder: one file, or of URDF one for each tree. Files that are there are replaced.
+
+    An installed writer is a function `(scene, folder, notes)` that gives the files it has written.
 
     Args:
         scene: what is written.
-        kind: one of `FORMATS`.
+        kind: one of `FORMATS`, or the name of an installed writer.
         folder: made where it is not there.
         entities: those that are meant; all where empty.
 
     Raises:
         AnysimError: an unknown format or entity, or something that the format cannot say.
     """
-    if kind not in FORMATS:
-        raise AnysimError(f"there is no format '{kind}'{suggest(kind, FORMATS)} (formats: {', '.join(FORMATS)})")
+    known = [*FORMATS, *registry.names("model_writers")]
+    if kind not in known and ("model_writers", kind) not in registry.INSTALL_HINTS:
+        raise AnysimError(f"there is no format '{kind}'{suggest(kind, known)} (formats: {', '.join(known)})")
+    writer = None if kind in FORMATS else registry.load("model_writers", kind)
     notes, meshes = Notes(), MeshFiles(folder)
     scene = _chosen(scene, entities, notes)
     folder.mkdir(parents=True, exist_ok=True)
+    if writer is not None:
+        with registry.using("model_writers", kind):
+            return ModelFiles(tuple(writer(scene, folder, notes)), (), notes.told())
     if kind == "mjcf":
         files = [_file(folder, scene.name, ".xml", mjcf(scene, meshes, notes))]
         return ModelFiles(tuple(files), tuple(meshes.written), notes.told())

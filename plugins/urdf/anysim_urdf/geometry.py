@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from anysim.assets.bounded_files import check
-from anysim.assets.meshes import collision_mesh, visual_parts
+from anysim.assets.meshes import WholeMesh, collision_mesh, visual_parts, whole_of
 from anysim.assets.model import ImportNote
 from anysim.assets.uri import Folders, MissingReferenceError, resolve_reference
 from anysim.conventions import Array
@@ -42,6 +42,7 @@ class GeometryReader:
         self.geoms: list[Geom] = []
         self.geom_links: list[str] = []
         self.meshes: dict[str, Mesh] = {}
+        self.wholes: dict[str, WholeMesh] = {}
         self._read: dict[tuple[Path, Vec3], int] = {}
         self._folders: Folders = {}
 
@@ -91,7 +92,9 @@ class GeometryReader:
         else:
             path = self._path(link, collision)
             try:
-                shape = MeshShape(self._keep(collision_mesh(path, self._mesh_scale(collision))))
+                size = self._mesh_scale(collision)
+                shape = MeshShape(self._keep(collision_mesh(path, size)))
+                self.wholes[shape.mesh] = whole_of(path, size)
             except AssetError as error:
                 raise AssetError(f"{self._file.where('link', link)}: {error}") from error
         self._add(link, Geom(name, body, shape, position, quaternion, _GREY, visible=visible))

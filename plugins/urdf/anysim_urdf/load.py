@@ -120,6 +120,7 @@ class _UrdfImport:
             meshes=tuple(geometry.meshes.values()),
             links=self.place,
             report=tuple(self.notes),
+            wholes=geometry.wholes,
         )
 
     # ------------------------------------------------------------------ the tree

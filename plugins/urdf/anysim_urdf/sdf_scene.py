@@ -55,6 +55,9 @@ class _Scene:
         if ground:
             first = next(iter(ground.values()))
             self._put(("world", "terrain"), self._terrain(first), first)
+            for other in list(ground)[1:]:
+                text = f"is a level plane at height 0 as '{next(iter(ground))}' is, which is the ground; it is left out"
+                self.notes.append(ImportNote("dropped", f"model '{other}'", text))
         else:
             self._put(("world", "terrain"), {"kind": "none"}, self.world)
         check(self.path, SCENE_PARTS, sum(len(model.roots) for model in self.models.values()))

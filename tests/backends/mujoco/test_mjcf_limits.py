@@ -86,6 +86,11 @@ def test_no_reference_leaves_the_root(root: Path, inner: str) -> None:
     refused(root, inner, "leaves the asset's root")
 
 
+def test_a_loop_of_links_is_refused(root: Path) -> None:
+    (root / "loop.obj").symlink_to(root / "loop.obj")
+    refused(root, world('<body name="b"><flexcomp name="f" type="mesh" file="loop.obj"/></body>'), "cannot be found")
+
+
 def test_an_attached_model_keeps_its_own_folder(root: Path) -> None:
     (root / "part" / "meshes").mkdir(parents=True)
     (root / "part" / "meshes" / "t.obj").write_text(TETRAHEDRON)

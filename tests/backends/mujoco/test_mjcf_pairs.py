@@ -13,6 +13,7 @@ from anysim.engine.factory import create_simulation, runnable
 from anysim.model.frames import find_frame
 from anysim.model.world import EntityKind, World
 from anysim_mujoco.mjcf.load import import_mjcf
+from tests.tiers import often
 
 Load = Callable[[str], ImportedModel]
 
@@ -65,7 +66,7 @@ def test_a_body_with_several_joints_does_not_collide_with_its_parent(load: Load)
     assert model.excluded_pairs == {(0, 3)}
 
 
-@pytest.mark.parametrize("engine", runnable())
+@pytest.mark.parametrize("engine", often(["mujoco", "null"], runnable()))
 def test_it_stays_whole_on_every_engine(load: Load, engine: str) -> None:
     """Shapes overlap at the hip by 5 cm: pushed apart they would turn at hundreds of radians a second."""
     simulation: SimEngine = create_simulation(engine)

@@ -13,7 +13,7 @@ from anysim.errors import AnysimError, CapabilityError, SpecError
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, World
 from anysim.testing.audit import audit
-from tests.tiers import ENGINES
+from tests.tiers import ENGINES, often
 
 SCENE = """<mujoco model="kitchen">
   <option gravity="0 0 -9.8" timestep="0.004"/>
@@ -160,7 +160,7 @@ def _unread() -> object:
     return WorldSpec.model_validate({"source": "kitchen.xml"})
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", often(["mujoco"], ENGINES))
 def test_engines_build_what_was_read_and_it_falls(engine: str, folder: Path) -> None:
     overrides = [f"engine={engine}", "world.cameras=null"]
     with make(watched(load(folder / "world.yaml", overrides=overrides)), base=folder) as env:

@@ -121,7 +121,9 @@ def test_unknown_options_are_refused():
         create_simulation("pybullet", iteration=3)
 
 
-@pytest.mark.parametrize(("robot", "usual"), [("franka_panda", 50), ("tiago_pro", 100)])
+@pytest.mark.parametrize(
+    ("robot", "usual"), [("franka_panda", 50), pytest.param("tiago_pro", 100, marks=pytest.mark.slow)]
+)
 def test_linkages_get_more_sweeps(robot, usual):
     """The Panda has one finger that follows, a gripper of TIAGo Pro five joints."""
     world = compile_world({"world": {"robots": {"r": {"robot": robot}}}})

@@ -9,6 +9,7 @@ from anysim.model.forward_kinematics import forward_kinematics
 from anysim.testing.engines import require_drawing
 from anysim_annotation.capture import Capture, Moment
 from anysim_annotation.legend import Legend
+from tests.tiers import ENGINES, often
 
 SIZE = (128, 96)
 NAMES = ("boxes_2d", "depth", "flow", "instance", "normals", "point_cloud", "semantic")
@@ -31,7 +32,7 @@ def two_moments(env: anysim.task.env.TaskEnv) -> list[Moment]:
     return [Moment(ids, np.array([k]), rows) for k, rows in enumerate((poses, later))]
 
 
-@pytest.fixture(scope="module", params=["mujoco", "pybullet", "sapien"])
+@pytest.fixture(scope="module", params=often(["mujoco"], ENGINES))
 def seen(request: pytest.FixtureRequest):
     """Labels of the second moment by both sources, by camera, and the world."""
     require_drawing(request.param)

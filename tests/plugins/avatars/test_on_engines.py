@@ -1,9 +1,6 @@
 """Avatars on engines: what they push and carry, recordings that replay, images and rays that see them, the suite."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +14,7 @@ from anysim.record.replay import replay
 from anysim.testing.audit import audit
 from anysim.testing.engines import require_engine
 from anysim_recording.collector import Collector
+from tests.contract.suite_runs import run
 from tests.plugins.avatars.people import avatars, lived, run_of, wait
 from tests.schemas.test_every_key import Still
 
@@ -193,15 +191,6 @@ def test_the_suite_clears_them(engine: str, tmp_path: Path) -> None:
     ]
     words = ["-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--pyargs", "anysim.testing.families"]
     words += ["--family", "avatar", "--engine", engine, *(w for o in options for w in ("--family-option", o))]
-    environment = {**os.environ, "PYTHONPATH": os.environ.get("PYTHONPATH", "")}
-    done = subprocess.run(
-        [sys.executable, *words],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env=environment,
-        cwd=tmp_path,
-        check=False,
-    )
+    done = run(*words, folder=tmp_path)
     assert done.returncode == 0, done.stdout[-3000:]
     assert re.search(rf"family avatar on {engine}: 9 passed, 1 skipped", done.stdout)

@@ -94,6 +94,7 @@ def test_verdicts_do_not_depend_on_order_and_number_of_envs() -> None:
         np.testing.assert_array_equal(trial.run(some.take(back)).margin[back], there)
 
 
+@pytest.mark.slow
 def test_a_bank_says_where_the_tip_comes_to() -> None:
     bank, rate = made(of(), "mujoco", Order(360, 8), print)
     assert rate > 0

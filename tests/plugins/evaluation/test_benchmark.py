@@ -223,7 +223,7 @@ def test_the_protocol_of_the_guide_runs(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_neither_workers_nor_kills_change_the_results(tiny: Path) -> None:
     text = TEXT.replace("horizon: 12", "horizon: 120").replace("horizon: 6", "horizon: 60")
-    tiny.write_text(text.replace("episodes: 4", "episodes: 30"))
+    tiny.write_text(text.replace("episodes: 4", "episodes: 16"))
     freezing.freeze(load_protocol(str(tiny)))
     code = "import sys; from anysim.cli.main import main; sys.exit(main())"
 
@@ -232,7 +232,7 @@ def test_neither_workers_nor_kills_change_the_results(tiny: Path) -> None:
 
     alone, killed = tiny.parent / "alone", tiny.parent / "killed"
     subprocess.run(command(alone, 1), check=True, capture_output=True, timeout=120)
-    for done in (10, 90):
+    for done in (6, 48):
         run = subprocess.Popen(command(killed, 2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 60
         while sum(lines(killed).values()) < done and run.poll() is None and time.monotonic() < deadline:
@@ -241,7 +241,7 @@ def test_neither_workers_nor_kills_change_the_results(tiny: Path) -> None:
         assert run.wait() == -signal.SIGKILL
     subprocess.run(command(killed, 2), check=True, capture_output=True, timeout=120)
     assert (alone / "results.json").read_bytes() == (killed / "results.json").read_bytes()
-    assert set(lines(killed).values()) == {31}
+    assert set(lines(killed).values()) == {17}
     assert list(killed.glob("*.worker")) == []
 
 

@@ -40,7 +40,10 @@ def same(a: Any, b: Any) -> bool:
     return bool(np.array_equal(a, b))
 
 
-@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize(
+    "mode",
+    [pytest.param(mode, marks=[pytest.mark.slow] if mode != AutoresetMode.NEXT_STEP else []) for mode in AutoresetMode],
+)
 def test_the_vector_view_equals_sync_vector_env(mode: AutoresetMode) -> None:
     def single() -> gym.Env:
         return GymEnv(arm(1, "task.horizon=9"))

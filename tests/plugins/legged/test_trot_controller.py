@@ -14,6 +14,7 @@ from anysim.testing.quadrupeds import QUADRUPEDS, WITH_ARM, made, spec
 from anysim_legged.gait import GaitParameters, Motion, Trot
 from anysim_legged.legs import Legs
 from anysim_legged.weight import shares
+from tests.tiers import often
 
 ALL = slice(None)
 DT = 0.02
@@ -24,7 +25,7 @@ def robot_of(name: str) -> ControlledRobot:
     return ControlledRobot(anysim.compile_world(spec(name, "null")), "robot")
 
 
-@pytest.mark.parametrize("name", [*QUADRUPEDS, *WITH_ARM])
+@pytest.mark.parametrize("name", often(QUADRUPEDS, [*QUADRUPEDS, *WITH_ARM]))
 def test_leg_kinematics_are_the_models(name: str) -> None:
     robot = robot_of(name)
     model, legs = robot.kinematics, Legs.of(robot)

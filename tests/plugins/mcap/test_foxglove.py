@@ -24,6 +24,8 @@ from tests.plugins.mcap.everything import Still
 from tests.plugins.mcap.exported import Heard, assert_consistent, heard
 from tests.plugins.sensors.declared import SENSORS, world
 
+pytestmark = pytest.mark.xdist_group("foxglove")  # one recording for all tests
+
 STEPS = 9
 
 

@@ -72,11 +72,10 @@ def test_recordings_replay_and_stream_points(engine, tmp_path: Path):
 @pytest.mark.parametrize(
     ("engine", "kind"),
     [
-        ("mujoco", "fluid"),
-        *(pytest.param(*row, marks=pytest.mark.slow) for row in (("pybullet", "fluid"), ("sapien", "sand"))),
+        *(pytest.param(*row, marks=pytest.mark.slow) for row in (("mujoco", "fluid"), ("sapien", "sand"))),
         *(
             pytest.param(*row, marks=pytest.mark.full)
-            for row in (("mujoco", "sand"), ("pybullet", "sand"), ("sapien", "fluid"))
+            for row in (("mujoco", "sand"), ("pybullet", "fluid"), ("pybullet", "sand"), ("sapien", "fluid"))
         ),
     ],
 )

@@ -27,8 +27,8 @@ def test_a_crash_an_exit_code_and_a_hang_are_words() -> None:
     died = run_module("dies", limit=60.0)
     assert (died.out, died.trouble) == ("on its way\n", "was ended by signal 11 (SIGSEGV)")
     assert run_module("wrong", limit=60.0) == ProcessEnd("", "no\n", "ended with exit code 1")
-    hung = run_module("slow", limit=5.0)
-    assert (hung.out, hung.trouble) == ("begun\n", "took longer than 5 s and was stopped")
+    hung = run_module("slow", limit=3.0)
+    assert (hung.out, hung.trouble) == ("begun\n", "took longer than 3 s and was stopped")
 
 
 def test_unknown_signals_have_numbers() -> None:

@@ -27,7 +27,7 @@ def same_pages(pages, wanted, what):
 # ---------------------------------------------------------------------- results
 
 
-@pytest.mark.parametrize("shards", [1, 2, 3])
+@pytest.mark.parametrize("shards", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_results_do_not_depend_on_the_shards(shards):
     with NullEngine() as alone, sharded(NullEngine, shards)() as engine:
         same_pages(program(engine), program(alone), f"{shards} shards")

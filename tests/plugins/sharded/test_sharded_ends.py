@@ -166,6 +166,7 @@ def test_ctrl_c_that_is_caught(tmp_path, shared_memory):
     assert gone(pids)
 
 
+@pytest.mark.slow
 def test_a_fork_does_not_keep_the_workers(tmp_path, shared_memory):
     """A fork of the program that lives on holds nothing that the workers wait for, and ends without ending them."""
     process = _start(

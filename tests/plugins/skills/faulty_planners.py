@@ -26,7 +26,7 @@ class FaultyPlanner(RrtPlanner):
                 case "raises":
                     raise ZeroDivisionError
                 case "hangs":
-                    time.sleep(4.0)
+                    time.sleep(2.5)
                 case "dies":
                     os.kill(os.getpid(), signal.SIGKILL)
                 case "is slow":

@@ -19,6 +19,7 @@ from anysim_skills.arm import Arm
 from anysim_skills.planning import WORKERS_VARIABLE
 from anysim_skills.two_hands.arm_pair import ArmPair
 from tests.plugins.skills.test_pick import rollout
+from tests.tiers import often
 
 WORLD = Path(__file__).parent / "worlds/bi_lift.yaml"
 DOWN = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
@@ -163,7 +164,7 @@ def test_both_have_the_planner_of_each() -> None:
             ArmPair.of(*arms, planner="rrt", latency=9)
 
 
-@pytest.mark.parametrize("task", ["bi_lift", "handover"])
+@pytest.mark.parametrize("task", often(["handover"], ["bi_lift", "handover"]))
 def test_skills_of_two_arms_plan_both_at_once(task: str) -> None:
     """And say so in their records; phases `plan` are passed in each env."""
     require_engine("mujoco")

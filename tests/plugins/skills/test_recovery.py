@@ -13,8 +13,8 @@ from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from anysim_skills.arm import Arm
 from tests.plugins.skills.test_manipulation import WORLDS
+from tests.tiers import ENGINES, often
 
-ENGINES = ["mujoco", "pybullet", "sapien"]
 ONE = np.array([0])
 TURNED_UP = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.3, 0.0])
 """[rad] from home; the tool looks up by that much."""
@@ -31,7 +31,7 @@ def run(env: TaskEnv, policy: SkillPolicy, meanwhile: Callable[[str], None] = la
     return ladder
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", often(["pybullet"], ENGINES))
 def test_an_arm_in_an_awkward_posture_reaches_from_home(engine: str) -> None:
     """The tool keeps its orientation, in which the goal is out of reach; from home it comes from above."""
     require_engine(engine)
@@ -46,7 +46,7 @@ def test_an_arm_in_an_awkward_posture_reaches_from_home(engine: str) -> None:
         assert env.status[0] == "success"
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", often(["mujoco"], ENGINES))
 def test_what_is_held_is_kept_where_it_cannot_be_put(engine: str) -> None:
     """The pad is out of reach: the cube is carried home, tried once more from there, and not dropped."""
     require_engine(engine)
@@ -105,7 +105,7 @@ def swapped(env: TaskEnv, policy: SkillPolicy, times: int) -> list[str]:
     return run(env, policy, swap)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", often(["sapien"], ENGINES))
 def test_a_neighbour_between_the_fingers_is_let_go_of_and_the_right_one_grasped(engine: str) -> None:
     require_engine(engine)
     with make(WORLDS / "two_cubes.yaml", engine=engine) as env:

@@ -14,6 +14,7 @@ from anysim.testing.engines import require_drawing, require_engine
 from anysim_soft.inflatable import AIR, Inflatable, slopes, sphere, volume
 from tests.contract.suite_runs import run
 from tests.plugins.soft.softs import ALL, ENGINES, begun, run_of, wait
+from tests.tiers import others
 
 EACH = pytest.mark.parametrize("engine", ["mujoco", *(pytest.param(e, marks=pytest.mark.slow) for e in ENGINES[1:])])
 BALLOON = {"kind": "inflatable", "radius": 0.1, "subdivisions": 1, "pressure": 500.0}
@@ -87,8 +88,7 @@ def test_images_see_it(engine):
         assert red[0] > 1.5 * red[2]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [*others("pybullet"), pytest.param("mujoco", marks=pytest.mark.full)])
 def test_the_suite_clears_it(engine, tmp_path: Path):
     """A balloon that falls onto a ball: snapshots, partial resets and steps, and what is lost, as the suite has it."""
     require_engine(engine)

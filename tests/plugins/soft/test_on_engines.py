@@ -14,6 +14,7 @@ from anysim_recording.collector import Collector
 from tests.contract.suite_runs import run
 from tests.plugins.soft.softs import ALL, ENGINES, begun, run_of, wait, with_ball
 from tests.schemas.test_every_key import Still
+from tests.tiers import in_turn
 
 EACH = pytest.mark.parametrize("engine", ["mujoco", *(pytest.param(e, marks=pytest.mark.slow) for e in ENGINES[1:])])
 EXACT = {"mujoco": 1e-6, "pybullet": 1e-6, "sapien": 1e-5}
@@ -125,10 +126,8 @@ OPTIONS = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", OPTIONS)
-@pytest.mark.parametrize("engine", ENGINES)
-def test_the_suite_clears_it(engine, kind, tmp_path: Path):
+@pytest.mark.parametrize(("kind", "engine"), in_turn(OPTIONS))
+def test_the_suite_clears_it(kind, engine, tmp_path: Path):
     """Matter that falls onto a ball: snapshots, partial resets and steps, and what is lost, as the suite has it."""
     require_engine(engine)
     words = ["-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--pyargs", "anysim.testing.families"]

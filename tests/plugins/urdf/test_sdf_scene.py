@@ -101,6 +101,18 @@ def test_what_is_not_in_the_world_is_told(folder: Path) -> None:
     assert "<plane>" not in told
 
 
+def test_a_second_level_plane_is_told(tmp_path: Path) -> None:
+    """The first is the ground; the other has nowhere to go."""
+    start, end = SCENE.index('<model name="ground_plane">'), SCENE.index('<model name="table">')
+    other = SCENE[start:end].replace("ground_plane", "carpet")
+    (tmp_path / "two.sdf").write_text(f'<sdf version="1.9"><world name="w">{SCENE[start:end]}{other}</world></sdf>')
+    spec = load({"world": {"source": str(tmp_path / "two.sdf")}}).spec
+    told = " ".join(map(str, compile_with_report(spec, base=tmp_path).report["source"]))
+    assert (
+        "model 'carpet': is a level plane at height 0 as 'ground_plane' is, which is the ground; it is left out" in told
+    )
+
+
 def test_faults_have_the_line_of_the_file(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "ball.sdf").write_text(BALL)
     (tmp_path / "world.yaml").write_text("world: {source: room.sdf}\n")

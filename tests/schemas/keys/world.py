@@ -61,6 +61,7 @@ HINGE = "world.objects.red.source={procedural: hinge_box}"
 MANY = *ALONE, "world.objects.red.count=8", "world.objects.red.family=rigid_instancer"
 MESH = "world.objects.red.source={mesh: 'file:$FILES/shapes/a.obj'}"
 FOLDER = "world.objects.red.source={folder: 'file:$FILES/shapes', pattern: '*'}"
+PIECES = "collision: {method: decompose, concavity: 0.05"
 PACKED = "source={asset: 'file:$FILES/packed.urdf', packages: {toys: 'file:$FILES"
 PATTERN = "world.objects.red.texture={pattern: noise}"
 MOUNT = "world.cameras.eye={mount: red, channels: []}"
@@ -227,6 +228,11 @@ ROWS: dict[str, Row] = {
     "SourceSpec.procedural": red("source={procedural: hinge_box}", VALVE),
     "SourceSpec.params": red("source={procedural: valve, params: {damping: 0.7}}", VALVE),
     "SourceSpec.scale": red("source={mesh: 'file:$FILES/shapes/a.obj', scale: 0.5}", MESH),
+    "SourceSpec.collision": red("source.collision={method: primitives}", MESH),
+    "SourceFolder.collision": red("source.collision={method: primitives}", FOLDER),
+    "CollisionShapesSpec.method": red("source.collision.method=primitives", f"{MESH[:-1]}, collision: hull}}"),
+    "CollisionShapesSpec.concavity": red("source.collision.concavity=0.5", f"{MESH[:-1]}, {PIECES}}}}}"),
+    "CollisionShapesSpec.pieces": red("source.collision.pieces=2", f"{MESH[:-1]}, {PIECES}}}}}"),
     "SourceFolder.folder": red("source={folder: 'file:$FILES/others', pattern: '*'}", FOLDER),
     "SourceFolder.pattern": red("source={folder: 'file:$FILES/shapes', pattern: 'a*'}", FOLDER),
     "SourceFolder.scale": red("source={folder: 'file:$FILES/shapes', pattern: '*', scale: 0.5}", FOLDER),

@@ -128,9 +128,12 @@ class MjcfBudget:
         folders = {"", *(c.get(key) or "" for c in tree.iter("compiler") for key in ("meshdir", "assetdir"))}
         for element in tree.iter("flexcomp"):
             for folder in folders if element.get("file") else ():
-                found = (path.parent / folder / (element.get("file") or "")).resolve()
+                name = f"<flexcomp> of {path.name}, line {element.sourceline}, refers to '{element.get('file')}'"
+                try:
+                    found = (path.parent / folder / (element.get("file") or "")).resolve()
+                except (RuntimeError, OSError) as error:  # a loop of symbolic links, too long a name
+                    raise AssetError(f"{name}, which cannot be found: {error}") from error
                 if not found.is_relative_to(self.root):
-                    name = f"<flexcomp> of {path.name}, line {element.sourceline}, refers to '{element.get('file')}'"
                     raise AssetError(f"{name}, which leaves the asset's root {self.root}: it is {found}")
                 if found.is_file():
                     mesh_bytes(found)

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from anysim import cache
-from anysim.assets.meshes import hull_of, light_mesh
+from anysim.assets.meshes import WholeMesh, hull_of, light_mesh, whole_read
 from anysim.assets.model import ImportNote
 from anysim.conventions import WORLD, Array, xyzw_from_wxyz
 from anysim.math import pose as P
@@ -50,6 +50,7 @@ class GeomReader:
         self.geoms: list[Geom] = []
         self.geom_links: list[str] = []
         self.meshes: dict[str, Mesh] = {}
+        self.wholes: dict[str, WholeMesh] = {}
         self.heightfields: dict[str, HeightField] = {}
         self.numbers: list[int] = []
         """The MuJoCo geom of each neutral one."""
@@ -132,7 +133,9 @@ class GeomReader:
         name = model.mesh(number).name
         source = cache.digest(self._source, name, repr(self._scale), mujoco.__version__)
         if collides:
-            return self._keep(hull_of(name, vertices, source))
+            shape = self._keep(hull_of(name, vertices, source))
+            self.wholes[shape.mesh] = whole_read(name, vertices, faces, source)
+            return shape
         return self._keep(light_mesh(name, vertices, faces, source, error=self._visual_error))
 
     def _keep(self, mesh: Mesh) -> MeshShape:

@@ -112,6 +112,7 @@ class _MjcfImport:
             spatial_tendons=tuple(couplings.spatial_tendons()),
             sensors=sensors,
             report=tuple(self.notes),
+            wholes=geometry.wholes,
         )
 
     # ------------------------------------------------------------------ the tree

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from anysim.assets.collision_shapes import with_collision
 from anysim.assets.load import import_asset, split_body
 from anysim.assets.model import ImportedModel
 from anysim.errors import AssetError
@@ -234,7 +235,7 @@ def draft(
     path = source.file.resolve()
     folders = {package: folder.resolve() for package, folder in {**source.packages, **packages}.items()}
     arguments = {**source.arguments, **arguments}
-    model = import_asset(source.uri or str(path), packages=_named(folders), params=arguments)
+    model = with_collision(import_asset(source.uri or str(path), packages=_named(folders), params=arguments), None)
     beside_it = beside(path)
     srdf = None if beside_it is None else read(beside_it, model)
     if srdf is not None:

@@ -1,0 +1,1 @@
+"""Collision geometry of meshes: convex pieces, primitives, triangles."""

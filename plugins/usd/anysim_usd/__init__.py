@@ -1,0 +1,1 @@
+"""USD files as robots, objects and worlds of anysim, and worlds of anysim as USD files."""

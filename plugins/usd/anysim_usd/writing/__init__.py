@@ -1,0 +1,1 @@
+"""Worlds and robots of anysim, written as USD files."""
