@@ -85,6 +85,16 @@ def test_3mf_has_a_unit_and_stays_within_its_package(folder: Path) -> None:
         meshes.collision_mesh(folder / "damaged.3mf")
 
 
+def test_points_without_a_hull_and_long_names_are_refused_in_a_sentence(folder: Path) -> None:
+    for far in (np.inf, np.nan, 1e200):
+        with pytest.raises(AssetError, match="not finite, or too far off"):
+            meshes.hull_of("far", np.array([[0.0, 0, 0], [far, 0, 0], [0, 1, 0], [0, 0, 1]]), str(far))
+    (folder / "long.gltf").write_text('{"buffers": [{"uri": "../' + "x/" * 100_000 + '"}]}')
+    with pytest.raises(AssetError, match=r"buffer (lies outside|cannot be found)") as caught:
+        meshes.collision_mesh(folder / "long.gltf")
+    assert len(str(caught.value)) < 1000
+
+
 def test_triangles_of_vertices_that_are_not_there_are_refused(folder: Path) -> None:
     data = write(folder / "box.glb", trimesh.creation.box((0.2, 0.4, 0.6))).read_bytes()
     first = 28 + int.from_bytes(data[12:16], "little")  # of the indices, behind the JSON

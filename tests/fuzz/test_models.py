@@ -164,7 +164,7 @@ def _another_text(root: Any, rng: np.random.Generator) -> None:
 def _another_value(root: Any, rng: np.random.Generator) -> None:
     element, key = pick(rng, _attributes(root))
     old = element.get(key)
-    if re.fullmatch(r"[-+.\de\s]+", old) and rng.random() < 0.7:
+    if old.strip() and re.fullmatch(r"[-+.\de\s]+", old) and rng.random() < 0.7:
         parts = old.split()
         parts[rng.integers(len(parts))] = pick(rng, NUMBERS)
         element.set(key, " ".join(parts))

@@ -260,10 +260,10 @@ def _files_beside(path: Path, data: bytes) -> list[Path]:
     try:
         files = [(here / unquote(name)).resolve() for name in asked if not name.startswith("data:")]
     except (ValueError, RuntimeError, OSError) as error:  # no name of a file, or a loop of symbolic links
-        raise AssetError(f"{path}: a buffer cannot be found: {error}") from error
+        raise AssetError(f"{path}: a buffer cannot be found: {str(error)[:300]}") from error
     for file in files:
         if not file.is_relative_to(here):
-            raise AssetError(f"{path}: a buffer lies outside of its folder: {file}")
+            raise AssetError(f"{path}: a buffer lies outside of its folder: {str(file)[:300]}")
     return files
 
 

@@ -74,6 +74,7 @@ def enclosed_volume(vertices: Array, faces: Array) -> float:
     return abs(float((a * np.cross(b, c)).sum())) / 6
 
 
+_FARTHEST = 1e100  # [m]; squares of what is beyond are not finite
 _THINNEST = 1e-3  # [m] that a flat mesh is thickened to, along the direction in which it has no extent
 
 
@@ -106,6 +107,8 @@ def convex_hull(points: Array, budget: int) -> tuple[Array, Array]:
 
 
 def _with_volume(points: Array) -> Array:
+    if not (np.abs(points) < _FARTHEST).all():
+        raise AssetError("a collision mesh has points that are not finite, or too far off to have a hull")
     centred = points - points.mean(axis=0) if len(points) else points
     if len(points) < 3:
         raise AssetError(f"a collision mesh needs at least three distinct points, this one has {len(points)}")
