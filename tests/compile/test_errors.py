@@ -108,7 +108,7 @@ def test_assets_that_do_not_suit(tmp_path: Path) -> None:
     for source, more, message in [
         ("a.urdf", {}, "objects.a.source: the root link 'base' of a free object has no mass"),
         ("a.urdf", {"density": 5}, "objects.a.density: an asset file has its own masses"),
-        ("a.txt", {}, "'.txt' is no format of robots and assets (.urdf, .xml, .mjcf, .sdf, .world, .xacro)"),
+        ("a.txt", {}, "'.txt' is no format of robots and assets (.urdf, .xml, .mjcf, .sdf, .usd, "),
     ]:
         spec = WorldSpec.model_validate({"objects": {"a": {"source": source, **more}}})
         with pytest.raises((SpecError, AssetError)) as caught:

@@ -63,6 +63,9 @@ class Soft(CoSolver):
         del spec
         return {}
 
+    def after_solve(self, env: int, sub: SubWorld) -> None:
+        """The solver of an env has moved on."""
+
     @property
     @abstractmethod
     def radius(self) -> float:
@@ -214,6 +217,7 @@ class Soft(CoSolver):
             done = sub.step(self.soft.substeps, self.parameter("drag", env), env)
             if len(self.pads):
                 self.pads.felt(env, sub.pulls())
+            self.after_solve(env, sub)
             self.received[env] += done.received
             self.state_row[env], self.moved[env] = sub.state(), sub.momentum()
             points = sub.points()
