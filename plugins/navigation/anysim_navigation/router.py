@@ -267,12 +267,11 @@ class BaseRouter:
 
     def _straight(self, field: Array, pose: Array, end: Array) -> bool:
         """Whether the line to the end of the way is free on the scan."""
-        from anysim_navigation.kernels.window import clearance
+        from anysim_navigation.kernels.window import clearances
 
-        way = in_frame(pose, end[None])[0]
-        no_movers, discs = np.zeros((0, 5)), self.limits.discs
+        way, discs, nobody = in_frame(pose, end[None])[0], self.limits.discs, np.zeros((0, 5))
         points = np.linspace(0.0, 1.0, 6)[1:, None] * way
-        return all(clearance(field, self._grid.cell, discs, no_movers, x, y, 0.0, 0.0) > -0.02 for x, y in points)
+        return all(clearances(field, self._grid.cell, discs, nobody, x, y, 0.0, 0.0)[0] > -0.02 for x, y in points)
 
 
 _ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear")
@@ -298,8 +297,9 @@ def frame_pose(scene: SceneView, frame: Frame) -> Array:
 
 def _roomiest(field: Array, cell: float, movers: Array) -> Array:
     """(2,) [m] the place at 0.35 m around the base that is furthest from everything, and from where movers will be."""
-    from anysim_navigation.kernels.window import clearance
+    from anysim_navigation.kernels.window import clearances
 
     turn = 2 * np.pi * np.arange(16) / 16
     places = 0.35 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    return places[int(np.argmax([clearance(field, cell, np.zeros((1, 3)), movers, x, y, 0.0, 1.0) for x, y in places]))]
+    at = np.zeros((1, 3))
+    return places[int(np.argmax([min(clearances(field, cell, at, movers, x, y, 0.0, 1.0)) for x, y in places]))]

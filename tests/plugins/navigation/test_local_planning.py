@@ -197,6 +197,27 @@ def test_a_mover_is_let_pass_where_it_will_be_not_where_it_is() -> None:
     assert np.allclose(window.choose(field, CELL, aim[None], aim, now, now, gone).twist, free)
 
 
+@pytest.mark.parametrize("gap", [0.3, -0.05])
+@pytest.mark.parametrize("others", [[], [[-0.75, 0.0, 0.0, 0.0, 0.35]]])
+def test_who_comes_is_fled_from_and_nobody_else_is_run_into(gap: float, others: list[list[float]]) -> None:
+    """One who walks up from the front, near or already too near, with another one behind, or nobody there."""
+    window, field = DynamicWindow(limits(BaseKind.HOLONOMIC)), Scene().field(np.zeros(3))
+    movers, here, now = np.array([[0.6 + gap, 0.0, -0.5, 0.0, 0.35], *others]), np.zeros(2), np.zeros(3)
+    most = window.limits.acceleration * STEP
+    for _ in range(12):
+        seen = movers.copy()
+        seen[:, :2] -= here
+        aim = np.array([0.3, 0.0]) - here
+        now = now + np.clip(window.choose(field, CELL, aim[None], aim, now, now, seen).twist - now, -most, most)
+        now[2] = 0.0  # it looks ahead all the time
+        here = here + now[:2] * STEP
+        movers[:, :2] += movers[:, 2:4] * STEP
+        away = np.linalg.norm(movers[:, :2] - here, axis=1) - 0.6
+        assert (away[1:] > -0.02).all()
+    standing = np.hypot(*movers[0, :2]) - 0.6
+    assert away[0] > standing + 0.2
+
+
 def test_equal_questions_have_equal_answers() -> None:
     window, field = DynamicWindow(limits(BaseKind.HOLONOMIC)), PILLAR.field(np.zeros(3))
     way, aim, now = np.array([[0.0, 0.0], [0.9, 0.7]]), np.array([0.9, 0.7]), np.array([0.2, 0.1, 0.0])

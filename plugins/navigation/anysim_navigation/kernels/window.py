@@ -30,22 +30,21 @@ def distance_at(field: Array, cell: float, x: float, y: float) -> float:
 
 
 @compiled
-def clearance(
+def clearances(
     field: Array, cell: float, discs: Array, movers: Array, x: float, y: float, yaw: float, time: float
-) -> float:
-    """[m] between a base at a pose and what is nearest at a time [s] from now; below 0 they overlap.
+) -> tuple[float, float]:
+    """[m] from a base at a pose to what is nearest, and to the nearest mover in a time [s]; below 0 they overlap.
 
     `movers` (M, 5) are discs with their velocities, x, y, vx, vy and radius, which go on as they do now.
     """
-    cosine, sine, least = math.cos(yaw), math.sin(yaw), FAR
+    cosine, sine, least, apart = math.cos(yaw), math.sin(yaw), FAR, FAR
     for d in range(len(discs)):
-        px = x + cosine * discs[d, 0] - sine * discs[d, 1]
-        py = y + sine * discs[d, 0] + cosine * discs[d, 1]
+        px, py = x + cosine * discs[d, 0] - sine * discs[d, 1], y + sine * discs[d, 0] + cosine * discs[d, 1]
         least = min(least, distance_at(field, cell, px, py) - 0.5 * cell - discs[d, 2])
         for m in range(len(movers)):
             mx, my = movers[m, 0] + time * movers[m, 2], movers[m, 1] + time * movers[m, 3]
-            least = min(least, math.hypot(mx - px, my - py) - movers[m, 4] - discs[d, 2])
-    return least
+            apart = min(apart, math.hypot(mx - px, my - py) - movers[m, 4] - discs[d, 2])
+    return least, apart
 
 
 @compiled
@@ -114,8 +113,8 @@ def choose(
     """
     step, horizon, window = timing[0], timing[1], timing[2]
     steps = round(horizon / step)
-    here = clearance(field, cell, discs, movers, 0.0, 0.0, 0.0, 0.0)
-    floor = min(0.0, here) - 1e-9  # what is too near already may go, but not nearer
+    stood = [clearances(field, cell, discs, movers, 0.0, 0.0, 0.0, k * step) for k in range(steps + 1)]
+    floor = min(0.0, stood[0][0]) - 1e-9  # what is too near already may go, but not nearer
     fastest_way = max(high[0], -low[0])
     best, out[0], out[1], out[2] = np.inf, 0.0, 0.0, 0.0
     bottom, top = np.empty(3), np.empty(3)
@@ -148,14 +147,15 @@ def choose(
                     y += (vx * math.sin(middle) + vy * math.cos(middle)) * step
                     yaw += w * step
                     time = k * step
-                    room = clearance(field, cell, discs, movers, x, y, yaw, time)
-                    if room < floor and time <= braking:
+                    room, apart = clearances(field, cell, discs, movers, x, y, yaw, time)
+                    nearer = apart < min(0.0, stood[k][1]) - 1e-9  # to who moves than if the base stood
+                    if (room < floor or nearer) and time <= braking:
                         free = False
                         break
-                    if room < 0.0:
+                    if room < 0.0 or nearer:
                         hit = 1.0 - time / horizon + 0.2
                         break
-                    near += max(0.0, margin - room) / margin
+                    near += max(0.0, margin - min(room, apart)) / margin
                 if not free:
                     continue
                 left = math.hypot(aim[0] - x, aim[1] - y)
@@ -181,4 +181,4 @@ def choose(
                 )
                 if cost < best:
                     best, out[0], out[1], out[2] = cost, forward, aside, turn
-    return best, here
+    return best, min(stood[0][0], stood[0][1])
