@@ -1,5 +1,7 @@
 """A rope against formulas, with the tolerances that the docs state."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -88,7 +90,8 @@ def test_a_hand_that_closes_holds_a_rope_feels_its_weight_and_is_remembered():
             env.step(close)
             if step >= 80:
                 pulls.append(it.pads.force[0, 0])
-        assert env.families.facts(0)["it"]["pads"]["hand"]["stage"] == "holding"
+        pads: Any = env.families.facts(0)["it"]["pads"]
+        assert pads["hand"]["stage"] == "holding"
         found = it.balance(ALL)
         assert np.abs((found.now - found.begun - found.received + found.given)[:, :3]).max() < 1e-9
         assert np.mean(pulls) == pytest.approx(it.mass(0) * 9.81, rel=0.1)
