@@ -9,8 +9,10 @@ from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.families.base import FamilyState
 from anysim.math import pose as P
+from anysim.skills.base import OUTCOMES, Outcome
 from anysim.task.scene import Frame, SceneView
 from anysim.task.slot_frames import CategoryView
+from anysim_skills.arm import Arm
 
 Along = Annotated[float, Field(ge=0, le=1, description="a point of the rope: 0 is its start, 1 its end")]
 
@@ -47,6 +49,10 @@ class Cord:
         near = P.norm(state.points - places[:, None]) < within
         return np.logical_or.reduce(near & state.fields["held"], axis=1)
 
+    def kept(self, arm: Arm, at: Array, said: Array) -> Array:
+        """(n,) what a phase says in rows of the scene where the arm's hand holds it; else an unstable grasp."""
+        return np.where(self.held_near(arm.tool.position)[at], said, _UNSTABLE)
+
     def around(self, post: Frame) -> tuple[Array, Array]:
         """(n,) [rad] by which it goes around the axis z of a frame, left positive; (n,) [m] how near to it it comes."""
         points = self.state().points
@@ -57,3 +63,6 @@ class Cord:
         way = b - a
         share = np.clip(-(a * way).sum(axis=-1) / np.maximum((way * way).sum(axis=-1), 1e-12), 0.0, 1.0)
         return step.sum(axis=1), P.norm(a + share[..., None] * way).min(axis=1)
+
+
+_UNSTABLE = OUTCOMES.index(Outcome.UNSTABLE_GRASP)

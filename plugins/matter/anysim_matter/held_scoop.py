@@ -59,6 +59,13 @@ class HeldScoop:
         there = self.arm.arrived(ids, at, within, 0.1) | late
         return np.where(self.arm.holds(ids, at, self.thing.root), np.where(there, GO_ON, STAY), _UNSTABLE)
 
+    def rise(self, ids: Array, at: Array, height: Array, speed: float) -> Array:
+        """(n,) as `went`, of the tool on its way straight up to heights (n,) [m], so that nothing is swept away."""
+        up = self.arm.command[ids].copy()
+        up[:, 2] = np.maximum(up[:, 2], height)
+        self.arm.go(ids, up, speed)
+        return self.went(ids, at, 0.02)
+
 
 def inside(contents: CategoryView, at: Array, frame: Array, low: Array, high: Array) -> Array:
     """(n, P) bool: which of the contents, in rows of the scene, are between corners (n, 3) [m] in frames (n, 7)."""

@@ -95,8 +95,7 @@ class RopeGrasp(PhasedSkill):
         self.arm.go(ids, self.arm.command[ids] + up, self._speed / 2)
 
     def _rising(self, ids: Array, at: Array) -> Array:
-        held = self.cord.held_near(self.arm.tool.position)[at]
-        return np.where(held, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY), _UNSTABLE)
+        return self.cord.kept(self.arm, at, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))
 
 
-_MISSED, _UNSTABLE = OUTCOMES.index(Outcome.MISSED_CONTACT), OUTCOMES.index(Outcome.UNSTABLE_GRASP)
+_MISSED = OUTCOMES.index(Outcome.MISSED_CONTACT)

@@ -7,7 +7,6 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
-from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
@@ -72,7 +71,7 @@ class RopeAround(PhasedSkill):
         aside = np.minimum(self._angle, np.pi / 2)
         goal = self._place(ids, at, self._begun[ids] + self._sign * aside)
         self.arm.go(ids, goal, self._speed)
-        return self._kept(at, np.where(self.arm.arrived(ids, at, 0.015, 0.15), GO_ON, STAY))
+        return self.cord.kept(self.arm, at, np.where(self.arm.arrived(ids, at, 0.015, 0.15), GO_ON, STAY))
 
     def _around(self, ids: Array, at: Array) -> Array:
         come = self._sign * (self._seen(at) - self._begun[ids])
@@ -81,10 +80,7 @@ class RopeAround(PhasedSkill):
         ahead = np.minimum(self._done[ids] + ON, self._angle)
         self.arm.go(ids, self._place(ids, at, self._begun[ids] + self._sign * ahead), self._speed)
         there = (ahead >= self._angle) & self.arm.arrived(ids, at, 0.015, 0.15)
-        return self._kept(at, np.where(there, GO_ON, STAY))
-
-    def _kept(self, at: Array, said: Array) -> Array:
-        return np.where(self.cord.held_near(self.arm.tool.position)[at], said, _UNSTABLE)
+        return self.cord.kept(self.arm, at, np.where(there, GO_ON, STAY))
 
 
 class RopeLay(PhasedSkill):
@@ -117,15 +113,9 @@ class RopeLay(PhasedSkill):
 
     def _carry(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._over(ids, at, self._above), self._speed)
-        return self._kept(at, np.where(self.arm.arrived(ids, at, 0.015, 0.15), GO_ON, STAY))
+        return self.cord.kept(self.arm, at, np.where(self.arm.arrived(ids, at, 0.015, 0.15), GO_ON, STAY))
 
     def _lower(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._over(ids, at, self._lowest), self._speed / 2)
         there = self.arm.arrived(ids, at, 0.006, 0.1) | self.arm.touching(ids, at) | (self.steps[ids] >= 80)
-        return self._kept(at, np.where(there, GO_ON, STAY))
-
-    def _kept(self, at: Array, said: Array) -> Array:
-        return np.where(self.cord.held_near(self.arm.tool.position)[at], said, _UNSTABLE)
-
-
-_UNSTABLE = OUTCOMES.index(Outcome.UNSTABLE_GRASP)
+        return self.cord.kept(self.arm, at, np.where(there, GO_ON, STAY))

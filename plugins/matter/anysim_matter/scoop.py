@@ -146,11 +146,7 @@ class Scoop(PhasedSkill):
         return np.where(left < self._least, _ADVERSE, np.where(self._choice.none_left(ids), _NO_IK, GO_ON))
 
     def _rise(self, ids: Array, at: Array) -> Array:
-        """Straight up, so that nothing is swept away."""
-        up = self.arm.command[ids].copy()
-        up[:, 2] = np.maximum(up[:, 2], self._goal(ids, 4)[:, 2])
-        self.arm.go(ids, up, self._speed)
-        return self._held.went(ids, at, 0.02)
+        return self._held.rise(ids, at, self._goal(ids, 4)[:, 2], self._speed)
 
     def _over(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._goal(ids, 0), self._speed)

@@ -104,10 +104,7 @@ class ScoopInto(PhasedSkill):
         return self._held.tools(ids, self._heading[ids, None], self._edge[ids][:, None], tilt)[:, 0]
 
     def _rise(self, ids: Array, at: Array) -> Array:
-        up = self.arm.command[ids].copy()
-        up[:, 2] = np.maximum(up[:, 2], self._goal(ids, -self._carried)[:, 2])
-        self.arm.go(ids, up, self._speed)
-        return self._held.went(ids, at, 0.02)
+        return self._held.rise(ids, at, self._goal(ids, -self._carried)[:, 2], self._speed)
 
     def _carry(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._goal(ids, -self._carried), self._speed)
