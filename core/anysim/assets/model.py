@@ -72,6 +72,18 @@ class ActuatorHint(NamedTuple):
         return self._replace(joint=joint(self.joint), shares=tuple((joint(j), ratio) for j, ratio in self.shares))
 
 
+def mode_of(gain: float, stiffness: float, damping: float) -> ControlMode | None:
+    """The mode of a drive of MuJoCo's, whose force is gain x control - stiffness x position - damping x velocity.
+
+    None where that is neither an effort nor an error of a position or a velocity.
+    """
+    if stiffness > 0 and abs(stiffness - gain) < 1e-9 * gain:
+        return ControlMode.POSITION
+    if stiffness == 0 and damping > 0 and abs(damping - gain) < 1e-9 * gain:
+        return ControlMode.VELOCITY
+    return ControlMode.EFFORT if stiffness == 0 and damping == 0 else None
+
+
 class SensorHint(NamedTuple):
     """A sensor that the source declares, for a draft of a catalogue entry and for scenes: an asset alone has none.
 

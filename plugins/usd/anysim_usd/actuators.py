@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from anysim.assets.model import ActuatorHint, ImportNote
+from anysim.assets.model import ActuatorHint, ImportNote, mode_of
 from anysim.model.world import ControlMode
 from anysim_usd.numbers import get, given
 from anysim_usd.space import Space
@@ -58,13 +58,8 @@ def _hint(
         return "has a gear of 0: it moves nothing"
     bias = get(prim, "mjc:biasPrm") if str(get(prim, "mjc:biasType") or "none") == "affine" else None
     stiffness, damping = (0.0 - float(v) for v in (*(bias or ()), 0.0, 0.0, 0.0)[1:3])
-    if stiffness > 0 and abs(stiffness - gain) < 1e-9 * gain:
-        mode = ControlMode.POSITION
-    elif stiffness == 0 and damping > 0 and abs(damping - gain) < 1e-9 * gain:
-        mode = ControlMode.VELOCITY
-    elif stiffness == 0 and damping == 0:
-        mode = ControlMode.EFFORT
-    else:
+    mode = mode_of(gain, stiffness, damping)
+    if mode is None:
         return "has a feedback that is no position or velocity error"
     limit = _range(prim, "force") * abs(gear)
     if mode is ControlMode.EFFORT:

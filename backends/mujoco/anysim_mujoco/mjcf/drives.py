@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from anysim.assets.model import ActuatorHint
+from anysim.assets.model import ActuatorHint, mode_of
 from anysim.model.world import ControlMode
 from anysim_mujoco.mjcf.couplings import Couplings
 
@@ -54,13 +54,8 @@ def drive_hint(
         return None, "has a gear of 0: it moves nothing"
     affine = model.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_AFFINE
     _, stiffness, damping = (-float(v) for v in model.actuator_biasprm[a, :3]) if affine else (0.0, 0.0, 0.0)
-    if stiffness > 0 and abs(stiffness - gain) < 1e-9 * gain:
-        mode = ControlMode.POSITION
-    elif stiffness == 0 and damping > 0 and abs(damping - gain) < 1e-9 * gain:
-        mode = ControlMode.VELOCITY
-    elif stiffness == 0 and damping == 0:
-        mode = ControlMode.EFFORT
-    else:
+    mode = mode_of(gain, stiffness, damping)
+    if mode is None:
         return None, "has a feedback that is no position or velocity error"
     limits = [inf]
     if model.actuator_forcelimited[a]:
