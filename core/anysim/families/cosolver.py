@@ -25,7 +25,8 @@ class MetBodies(NamedTuple):
         com: (n, K, 3) [m] their centres of mass.
         twist: (n, K, 6) [m/s, rad/s] velocity of the centre of mass, and rate.
         mass: (n, K) [kg]; inf of what joints hold, which a co-solver takes to move as it does, whatever it meets.
-        inertia: (n, K, 3, 3) [kg m^2] about the centre of mass.
+        moments: (n, K, 6) [kg m^2] xx, yy, zz, xy, xz, yz about the centre of mass, in the axes of the body.
+        turn: (n, K, 4) of these axes.
         friction: (n, G) of the World's geoms.
         there: (n, E) bool, the World's entities that are there.
         body_pose: (n, B, 7) of all bodies.
@@ -34,10 +35,16 @@ class MetBodies(NamedTuple):
     com: Array
     twist: Array
     mass: Array
-    inertia: Array
+    moments: Array
+    turn: Array
     friction: Array
     there: Array
     body_pose: Array
+
+    @property
+    def inertia(self) -> Array:
+        """(n, K, 3, 3) [kg m^2] about the centre of mass, world axes."""
+        return inertia.turned(self.moments, self.turn)
 
 
 class Balance(NamedTuple):
@@ -142,8 +149,8 @@ class CoSolver(Family):
         twist = np.concatenate([twist[..., :3] + P.cross(twist[..., 3:], arm), twist[..., 3:]], axis=-1)
         mass = np.where(self._held, np.inf, self._mass[env_ids])
         mass = np.where(there[:, self._entity], mass, 0.0)
-        tensor = inertia.turned(self._inertia[env_ids], own[..., 3:])
-        return MetBodies(own[..., :3] + arm, twist, mass, tensor, self._friction[env_ids], there, pose)
+        com, moments, turn = own[..., :3] + arm, self._inertia[env_ids], own[..., 3:]
+        return MetBodies(com, twist, mass, moments, turn, self._friction[env_ids], there, pose)
 
     # ------------------------------------------------------------------ what others ask of it
 

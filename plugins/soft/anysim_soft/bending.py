@@ -52,6 +52,9 @@ def bending_force(
     """
     if rigidity <= 0.0:
         return None
+    from scipy.sparse import csr_array
+
     stiff = -rigidity * matrix
     slowed = np.linalg.solve(np.eye(len(mass)) - h * damping * stiff / mass[None, :], damping * stiff)
-    return lambda _, places, velocities: stiff @ places + slowed @ velocities
+    bent = csr_array(stiff)  # a point has some 13 neighbours, and no more entries
+    return lambda _, places, velocities: bent @ places + slowed @ velocities

@@ -211,7 +211,6 @@ class Soft(CoSolver):
             sub = self._world(env)
             sub.take(self.state_row[env])
             sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
-            sub.place()
             if len(self.pads):
                 sub.hold(*self.pads.held(env))
             done = sub.step(self.soft.substeps, self.parameter("drag", env), env)

@@ -254,17 +254,17 @@ class SubWorld:
         return found
 
     def step(self, substeps: int, drag: float, env: int = 0) -> Outcome:
-        """Move on by `substeps` steps, from a state that was loaded; `env` is what its inner forces are told."""
+        """Move on by `substeps` steps from a state that was taken up; `env` is what its inner forces are told."""
         model, data, h = self.model, self.data, self.model.opt.timestep
         impulse, received = np.zeros((len(self._pose), 6)), np.zeros(6)
         slower = (1.0 - np.exp(-drag * h)) / h
         for _ in range(substeps):
+            mujoco.mj_step1(model, data)  # works out where everything is
             before = self.momentum() if self._pinned else np.zeros(6)
-            at, air = data.xpos[self._moving].copy(), -slower * self.mass[:, None] * data.qvel[self._dofs]
+            at, air = data.xpos[self._moving], -slower * self.mass[:, None] * data.qvel[self._dofs]
             data.qfrc_applied[self._dofs] = air if self.source.inner is None else air + self._inner(env)
             turn, centre = data.xmat[self._proxies].reshape(-1, 3, 3), data.xipos[self._proxies]
             arm = centre - data.xpos[self._proxies]
-            mujoco.mj_step1(model, data)
             if self._uneven:
                 self._even_contacts()
             mujoco.mj_step2(model, data)
@@ -272,8 +272,10 @@ class SubWorld:
             torque = np.einsum("kij,kj->ki", turn, force[:, 3:]) - P.cross(arm, force[:, :3])
             got = h * np.concatenate([force[:, :3], torque], axis=1)
             impulse += got
-            self.place()
+            if self._pinned:
+                mujoco.mj_kinematics(model, data)
             received += self._from_elsewhere(before, at, air, got, centre, h)
+        self.place()
         data.qfrc_applied[:] = 0.0
         return Outcome(impulse, received)
 
