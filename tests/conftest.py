@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
     from typer import Typer
@@ -29,6 +30,9 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: takes many seconds; `make test` leaves it out, `make test-slow` runs it")
     config.addinivalue_line("markers", "full: takes minutes and rarely finds more; only `make test-full` runs it")
     os.environ["ANYSIM_CACHE_DIR"] = str(ROOT / ".cache" / "tests")
+    # how long a busy machine takes for an example, or to draw it, is no fault of what is tested
+    settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    settings.load_profile("untimed")
 
 
 COMPILING = (

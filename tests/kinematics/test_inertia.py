@@ -30,7 +30,7 @@ def random_pose(rng: np.random.Generator) -> np.ndarray:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_composition_equals_the_union_of_the_points(seed: int) -> None:
     rng = np.random.default_rng(seed)
     masses, places, parts = [], [], []
@@ -48,14 +48,14 @@ def test_composition_equals_the_union_of_the_points(seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_possible_inertias_are_left_alone(seed: int) -> None:
     body = of_points(*cloud(np.random.default_rng(seed), 5))
     assert inertia.repaired(body) == (body, None)
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_repaired_inertias_are_possible_and_nearest_in_second_moments(seed: int) -> None:
     rng = np.random.default_rng(seed)
     matrix = rng.normal(size=(3, 3))
@@ -126,7 +126,7 @@ def test_worlds_made_by_hand_have_the_inertia_of_their_solids(shape: Shape) -> N
 
 
 @given(st.integers(0, 2**32 - 1), st.booleans())
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_principal_axes_give_the_tensor_back(seed: int, descending: bool) -> None:
     tensor = np.array(of_points(*cloud(np.random.default_rng(seed), 5)).inertia)
     moments, frame = inertia.principal(tensor, descending=descending)

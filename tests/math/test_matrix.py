@@ -1,6 +1,7 @@
 """Small matrices against numpy's, and the same bits whatever BLAS kernel numpy has."""
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -67,16 +68,21 @@ _KERNELS = ("Prescott", "Haswell", "SkylakeX")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
-def test_trajectories_are_the_same_bits_under_three_kernels(engine: str) -> None:
-    kernels, digests = zip(*(_under(kernel, engine) for kernel in _KERNELS), strict=True)
+def test_trajectories_are_the_same_bits_under_each_kernel(engine: str) -> None:
+    found = [done for kernel in _KERNELS if (done := _under(kernel, engine)) is not None]
+    kernels, digests = zip(*found, strict=True)
     if len(set(kernels)) == 1:
         pytest.skip(f"numpy's linear algebra here has one kernel only: {kernels[0]}")
     assert len(set(digests)) == 1
 
 
-def _under(kernel: str, engine: str) -> tuple[str, str]:
+def _under(kernel: str, engine: str) -> tuple[str, str] | None:
+    """The kernel and a digest; None where this processor lacks instructions that the kernel takes."""
     environment = {**os.environ, "OPENBLAS_CORETYPE": kernel}
     command = [sys.executable, "-c", _DIGEST.format(engine=engine)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=120)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=240)
+    if kernel != _KERNELS[0] and done.returncode == -signal.SIGILL:
+        return None
+    assert done.returncode == 0, done.stderr
     name, _, digest = done.stdout.strip().rpartition("|")
     return name, digest

@@ -30,7 +30,7 @@ def layouts_of(things, num_envs=2, first=0):
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(THINGS, st.integers(0, 1000))
 def test_everything_is_apart_on_the_table_and_the_same_again(things, seed) -> None:
     layouts = layouts_of(things)
@@ -49,7 +49,7 @@ def test_everything_is_apart_on_the_table_and_the_same_again(things, seed) -> No
     assert all(np.array_equal(pose[name][:1], alone[name]) for name in pose)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(THINGS, st.integers(0, 1000))
 def test_one_more_thing_moves_no_draw_of_the_others(things, seed) -> None:
     """Later entries leave earlier ones where they are as long as nobody has to make room."""
@@ -69,7 +69,7 @@ POINT = st.tuples(st.floats(-1, 1), st.floats(-1, 1)).map(lambda p: (round(p[0],
 UNIT = st.floats(0, 0.999)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(POINT, min_size=3, max_size=12), st.tuples(UNIT, UNIT, UNIT))
 def test_points_of_an_area_are_inside(points, numbers) -> None:
     outline = G.hull(points)

@@ -186,7 +186,7 @@ def test_syntax_errors_are_sentences(text, complaint):
     assert read(text)[1] == [complaint]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @example('a: "\\U00110000"')
 @example("%YAML 1.99999\n---\n")
 @example('a: "\\ud800"')
@@ -197,7 +197,7 @@ def test_no_text_raises(text):
     assert parse(text, "f.yaml", faults) is not None or faults
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.text(alphabet=st.sampled_from("ab01 .:-[]{}&*!'\",?~\n"), max_size=25))
 def test_both_readers_agree(text):
     fast = read(text)

@@ -96,7 +96,7 @@ def test_a_layout_with_almost_nothing(tmp_path):
     assert_equal(tmp_path, columns(3, 1, 0.0, BARE))
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     frames=st.integers(2, 60),
     first=st.integers(0, 1),

@@ -88,7 +88,7 @@ finite = hnp.arrays(np.float64, (6, 5), elements=st.floats(allow_nan=False, allo
 loose = hnp.arrays(np.float32, (6, 2), elements=st.floats(width=32, allow_nan=False))
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=finite, obs=loose, seed=st.integers(0, 1 << 80))
 def test_every_finite_float_comes_back_bit_for_bit(tmp_path_factory, values, obs, seed):
     layout = StateLayout(action=("u",), state={"x": (5,)}, obs={"o": ArrayLayout(shape=(2,), dtype="float32")})

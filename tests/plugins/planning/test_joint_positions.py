@@ -64,7 +64,7 @@ def test_the_requests_have_answers_of_both_kinds() -> None:
     assert {answer.chosen for answer in ALONE} >= {(1,), ()}
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(order=st.lists(st.integers(0, len(ASKED) - 1), min_size=1, max_size=20), flushed=st.integers(0, 20))
 def test_any_order_and_any_batch_give_the_answers_of_each_alone(
     threads: ThreadedService, order: list[int], flushed: int

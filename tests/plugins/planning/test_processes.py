@@ -162,7 +162,7 @@ def test_a_thousand_submits_and_cancels_with_faults_lose_nothing(monkeypatch: py
 
     with ProcessService(World(), Scripted, 2) as plans:
 
-        @settings(max_examples=20, deadline=None, database=None, derandomize=True)
+        @settings(max_examples=20, database=None, derandomize=True)
         @given(st.lists(call, min_size=50, max_size=50))
         def run(calls: list[tuple[int, int, bool, int | None]]) -> None:
             nonlocal submitted

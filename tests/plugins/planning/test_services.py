@@ -96,7 +96,7 @@ def test_a_newer_request_of_an_env_supersedes_what_has_not_begun(kind: Kind, wor
         assert (plans.counts.answered, plans.counts.cancelled) == (4, 1)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     asks=st.lists(st.tuples(st.integers(1, 9), st.integers(1, 3), st.none() | st.integers(0, 2), st.booleans())),
     workers=st.integers(1, 2),
@@ -174,7 +174,7 @@ def test_a_malformed_request_is_refused_where_it_is_made(kind: Kind) -> None:
         assert plans.counts.submitted == 0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.tuples(st.integers(0, 99), st.integers(1, 3), st.booleans()), min_size=50, max_size=50))
 def test_submits_and_cancels_lose_nothing(calls: list[tuple[int, int, bool]]) -> None:
     with ThreadedService(World(), Scripted, 2) as plans:
