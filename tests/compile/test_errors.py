@@ -126,7 +126,7 @@ def test_a_wrong_catalogue_entry_names_its_file(monkeypatch: pytest.MonkeyPatch)
     data = good.spec.to_dict()
     data["channels"]["eef"] |= {"joints": ["panda_finger_joint1", "panda_joint1"], "opened": [0.04]}
     data["channels"]["arm"]["joints"][6] = "panda_joint8"
-    data["tools"] = {"tip": {"link": "panda_tip"}, "panda_hand": {"link": "panda_hand"}}
+    data["tools"] = {"tip": {"link": "panda_tip"}, "panda_hand": {"link": "panda_hand", "position": [0.0, 0.0, 0.1]}}
     data["surfaces"] = [{"links": ["*finger", "panda_fingre*"]}]
     data["home"]["panda_finger_joint2"] = 0.01
     bad = RobotModelSpec.model_validate(data)

@@ -20,11 +20,13 @@ from anysim.compile.builder import WorldBuilder
 from anysim.compile.collisions import with_solids
 from anysim.compile.physical import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.compile.vehicle import check_vehicle
+from anysim.conventions import IDENTITY_QUATERNION
 from anysim.errors import AssetError, Issues, PluginError, SpecError, listing, suggest
 from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.hash import split
 from anysim.model.world import (
+    ORIGIN,
     Actuator,
     BodyKind,
     Channel,
@@ -319,19 +321,23 @@ class _Assembly:
     def _frame(
         self, builder: WorldBuilder, entity: Entity, kind: str, name: str, spec: ToolSpec | SensorPlaceSpec
     ) -> int | None:
-        """Add the site of a tool or sensor; None where its link is not there or its name is taken."""
+        """The site of a tool or sensor, a new one or that of the file it names; None where there can be none."""
         frames = self.model.frames
         if spec.link not in frames:
             known = f"{suggest(spec.link, list(frames))} (links: {listing(frames, 20)})"
             self.own.add(f"{kind}.{name}.link", f"there is no link '{spec.link}'{known}")
             return None
+        local = P.pose(spec.position, P.from_roll_pitch_yaw(np.array(spec.roll_pitch_yaw)))
+        full = f"{self.name}.{name}"
         if name in frames:
+            named = [i for i, site in enumerate(builder.sites) if site.name == full]
+            if named and spec.link == name and split(local) == (ORIGIN, IDENTITY_QUATERNION):
+                return named[0]
             self.own.add(f"{kind}.{name}", f"there is a link named '{name}' already; give the {kind[:-1]} another name")
             return None
         carrier = frames[spec.link]
-        local = P.pose(spec.position, P.from_roll_pitch_yaw(np.array(spec.roll_pitch_yaw)))
         position, quaternion = split(P.compose(P.pose(carrier.position, carrier.quaternion), local))
-        builder.sites.append(Site(f"{self.name}.{name}", entity.body_start + carrier.body, position, quaternion))
+        builder.sites.append(Site(full, entity.body_start + carrier.body, position, quaternion))
         return len(builder.sites) - 1
 
     def _geoms(self) -> tuple[Geom, ...]:

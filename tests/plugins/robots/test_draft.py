@@ -304,3 +304,17 @@ def test_roots_of_a_urdf_that_move(tmp_path: Path, kind: str, base: str, channel
         assert spec.channels["base"].joints == ("move.x", "move.y", "move.yaw")
         told = "base: fixed; move.x, move.y, move.yaw between an empty root and its first body carry it"
         assert told in made.guess.reasons
+
+
+def test_a_site_that_the_file_calls_tool_is_the_tool(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text(
+        """<mujoco model="arm"><worldbody><body name="upper"><joint name="shoulder" axis="0 1 0" range="-60 60"/>
+        <geom size=".05 .2" type="capsule"/><body name="hand" pos="0 0 .3"><joint name="wrist" axis="0 1 0" range="-60 60"/>
+        <geom size=".05 .1" type="capsule"/><site name="tool" pos="0 0 .1"/></body></body></worldbody></mujoco>""",
+        "utf-8",
+    )
+    world = built(draft(tmp_path / "arm.xml"), tmp_path)
+    (robot,) = world.robots
+    tool = world.sites[robot.tools["tool"]]
+    assert [site.name for site in world.sites] == ["robot.tool"]
+    assert (world.bodies[tool.body].name, tool.position) == ("robot.hand", (0.0, 0.0, 0.1))

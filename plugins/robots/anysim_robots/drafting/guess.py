@@ -277,7 +277,9 @@ def _category(legs: list[Leg], wheels: list[str], arm: list[str], eef: list[str]
 
 
 def _tool(model: ImportedModel, arm: list[str], eef: list[str]) -> str | None:
-    """A link named like a tool; else the link that carries the fingers; else the last link of the arm."""
+    """What is named `tool`, or like one; else the link that carries the fingers; else the last link of the arm."""
+    if "tool" in model.frames:
+        return "tool"
     named = [link for link in model.links if TOOL.search(link)]
     if named:
         return max(named, key=lambda link: (bool(re.search("tcp|tool|grasp|effector", link, re.I)), model.links[link]))
