@@ -310,7 +310,8 @@ def test_a_site_that_the_file_calls_tool_is_the_tool(tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text(
         """<mujoco model="arm"><worldbody><body name="upper"><joint name="shoulder" axis="0 1 0" range="-60 60"/>
         <geom size=".05 .2" type="capsule"/>
-        <body name="hand" pos="0 0 .3"><joint name="wrist" axis="0 1 0" range="-60 60"/><geom size=".05 .1" type="capsule"/><site name="tool" pos="0 0 .1"/></body></body></worldbody></mujoco>""",
+        <body name="hand" pos="0 0 .3"><joint name="wrist" axis="0 1 0" range="-60 60"/>
+        <geom size=".05 .1" type="capsule"/><site name="tool" pos="0 0 .1"/></body></body></worldbody></mujoco>""",
         "utf-8",
     )
     world = built(draft(tmp_path / "arm.xml"), tmp_path)
