@@ -17,6 +17,7 @@ from anysim.families.cosolver import about_origin
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_mujoco.geoms import add_assets, add_geom
+from anysim_soft.kernels import Exchange, account, even_rows
 
 HEAVY = 1e4
 """[kg], [kg m^2] of a body that joints hold."""
@@ -27,6 +28,7 @@ GRIP = (0.95, 0.99, 0.001, 0.5, 2.0)
 AWAY = -1e4
 """[m] height of the proxy of a body that is not there."""
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_DENSE = (np.zeros(0, dtype=np.int32),) * 3
 
 
 class FlexSource(NamedTuple):
@@ -114,18 +116,6 @@ class Scenery(NamedTuple):
         number = {b: tuple(n for n, i in enumerate(chosen) if world.geoms[i].body == b) for b in {*bodies, WORLD}}
         weightless = np.array([world.bodies[i].gravity_compensation for i in met], dtype=bool)
         return cls(replace(world, geoms=plain), met, still, number, np.array(chosen, dtype=np.intp), weightless)
-
-
-class Outcome(NamedTuple):
-    """What a physics step did.
-
-    Attributes:
-        impulse: (K, 6) [N s, N m s] on the bodies, about their centres of mass.
-        received: (6,) what the flex got from weight, air and what is fixed, about the world's origin.
-    """
-
-    impulse: Array
-    received: Array
 
 
 class SubWorld:
@@ -253,31 +243,28 @@ class SubWorld:
         found[place[data.efc_id[rows[::3]]]] = data.efc_force[rows].reshape(-1, 3)
         return found
 
-    def step(self, substeps: int, drag: float, env: int = 0) -> Outcome:
+    def step(self, substeps: int, drag: float, env: int = 0) -> Exchange:
         """Move on by `substeps` steps from a state that was taken up; `env` is what its inner forces are told."""
         model, data, h = self.model, self.data, self.model.opt.timestep
-        impulse, received = np.zeros((len(self._pose), 6)), np.zeros(6)
-        slower = (1.0 - np.exp(-drag * h)) / h
+        done = Exchange(np.zeros((len(self._pose), 6)), np.zeros(6))
+        slower, weight = (1.0 - np.exp(-drag * h)) / h, self.mass[:, None] * self.gravity
         for _ in range(substeps):
             mujoco.mj_step1(model, data)  # works out where everything is
-            before = self.momentum() if self._pinned else np.zeros(6)
-            at, air = data.xpos[self._moving], -slower * self.mass[:, None] * data.qvel[self._dofs]
+            before = self.momentum() if self._pinned else None
+            air = -slower * self.mass[:, None] * data.qvel[self._dofs]
             data.qfrc_applied[self._dofs] = air if self.source.inner is None else air + self._inner(env)
-            turn, centre = data.xmat[self._proxies].reshape(-1, 3, 3), data.xipos[self._proxies]
-            arm = centre - data.xpos[self._proxies]
             if self._uneven:
                 self._even_contacts()
             mujoco.mj_step2(model, data)
-            force = data.qfrc_constraint[self._twist]
-            torque = np.einsum("kij,kj->ki", turn, force[:, 3:]) - P.cross(arm, force[:, :3])
-            got = h * np.concatenate([force[:, :3], torque], axis=1)
-            impulse += got
-            if self._pinned:
+            bodies, points = (self._proxies, self._twist), (self._moving, self._dofs)
+            frames = data.xpos, data.xipos, data.xmat
+            account(data.qfrc_constraint, *frames, *bodies, *points, weight + air, h, self._pinned, done)
+            if before is not None:  # what holds it has no force of its own in MuJoCo: it gives what is missing
                 mujoco.mj_kinematics(model, data)
-            received += self._from_elsewhere(before, at, air, got, centre, h)
+                done.received[:] += self.momentum() - before
         self.place()
         data.qfrc_applied[:] = 0.0
-        return Outcome(impulse, received)
+        return done
 
     def _inner(self, env: int) -> Array:
         """(M, 3) [N] of the points on each other, those that move."""
@@ -296,34 +283,9 @@ class SubWorld:
         rows = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC))
         if not len(rows):
             return
-        if mujoco.mj_isSparse(model):
-            counts, begins = data.efc_J_rownnz[rows], data.efc_J_rowadr[rows]
-            entries = np.repeat(begins - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
-            owner, column = np.repeat(np.arange(len(rows)), counts), data.efc_J_colind[entries]
-        else:
-            entries = (rows[:, None] * model.nv + np.arange(model.nv)).ravel()
-            owner, column = np.repeat(np.arange(len(rows)), model.nv), np.tile(np.arange(model.nv), len(rows))
-        flat = data.efc_J.reshape(-1)
-        own = self._axis[column] >= 0
-        entries, owner, axis = entries[own], owner[own], self._axis[column[own]]
-        sums = np.zeros((len(rows), 3))
-        np.add.at(sums, (owner, axis), flat[entries])
-        flat[entries] /= np.where((size := P.norm(sums)) > 0, size, 1.0)[owner]
+        sparse = data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+        even_rows(rows, *(sparse if mujoco.mj_isSparse(model) else _DENSE), data.efc_J.reshape(-1), self._axis)
         mujoco.mj_referenceConstraint(model, data)
-
-    def _from_elsewhere(self, before: Array, at: Array, air: Array, got: Array, centre: Array, h: float) -> Array:
-        """What the flex got from all but the bodies that it meets."""
-        if self._pinned:  # what holds it has no force of its own in MuJoCo: it gives what is missing
-            change = self.momentum() - before
-            return change + _wrenches_about_origin(got, centre)
-        force = self.data.qfrc_constraint[self._dofs] + self.mass[:, None] * self.gravity + air
-        return h * about_origin(force, at) + _wrenches_about_origin(got, centre)
-
-
-def _wrenches_about_origin(impulse: Array, centre: Array) -> Array:
-    """(6,) the sum of impulses (K, 6) about centres (K, 3), about the world's origin."""
-    turned = impulse[:, 3:] + P.cross(centre, impulse[:, :3])
-    return np.concatenate([impulse[:, :3].sum(axis=0), turned.sum(axis=0)])
 
 
 def _faces(model: Any) -> Array:

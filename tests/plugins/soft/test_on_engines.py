@@ -56,10 +56,7 @@ def test_bodies_get_what_matter_loses(engine, kind):
 @OF_EACH
 @pytest.mark.slow
 def test_one_drop_on_three_engines(kind):
-    """A ball that falls onto matter on the ground: the same path within 1 mm; of a garment on SAPIEN within 3 mm.
-
-    Points of a garment are light, and SAPIEN tells poses in single precision.
-    """
+    """A ball that falls onto matter on the ground: the same path within 1 mm."""
     paths = {}
     for engine in ENGINES:
         require_engine(engine)
@@ -72,8 +69,7 @@ def test_one_drop_on_three_engines(kind):
             paths[engine] = np.array(path)
             assert np.abs(it.given[0, 0, 2]) > 0.01
     for engine in ENGINES[1:]:
-        close = 3e-3 if (kind, engine) == ("garment", "sapien") else 1e-3
-        assert np.abs(paths[engine] - paths["mujoco"]).max() < close, engine
+        assert np.abs(paths[engine] - paths["mujoco"]).max() < 1e-3, engine
 
 
 @OF_EACH
