@@ -27,8 +27,9 @@ MOST_POINTS = 1600
 OPTIONS = {"integrator": "implicitfast", "solver": "CG", "iterations": 100, "tolerance": 1e-8, "cone": "elliptic"}
 """With this integrator points and bodies get what constraints gave, however far the solver came."""
 EXACT = {**OPTIONS, "solver": "Newton", "iterations": 30}
-"""Of garments of few points that do not meet themselves. Gradients do not always get to the end: then paths on two engines
-part by a millimetre within half a second, where they differ by rounding. Elsewhere it takes three times as long."""
+"""Of garments of few points that do not meet themselves. Gradients do not always get to the end: then paths on two
+engines part by a millimetre within half a second, where they differ by rounding. Elsewhere it takes three times as
+long."""
 FEW = 200
 """Points up to which it takes no longer."""
 STABLE = 2.0
