@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import anysim
+from anysim.task.env import TaskEnv
 from anysim_particles.bench_cases import case_of
 
 SETTLE = 15
@@ -26,6 +27,7 @@ class FamilyCost(NamedTuple):
         wall_per_second: steps of all envs together per second.
         alone: steps of one env per second of processor time without the matter.
         one_by_one: the same in calls of one step each.
+        solver: steps of one env per second of processor time of the solver of the matter alone; None if not measured.
     """
 
     engine: str
@@ -36,6 +38,7 @@ class FamilyCost(NamedTuple):
     wall_per_second: float
     alone: float
     one_by_one: float
+    solver: float | None = None
 
 
 def tank(edge: float, height: float, wall: float = 0.02) -> dict[str, Any]:
@@ -77,13 +80,24 @@ def cost(kind: str, particles: int, num_envs: int, engine: str, steps: int) -> F
     return cost_in(world, kind, num_envs, engine, steps)
 
 
-def cost_in(world: dict[str, Any], called: str, num_envs: int, engine: str, steps: int) -> FamilyCost:
-    """The same in a world whose family or object `matter` is called so in the table."""
+def cost_in(
+    world: dict[str, Any],
+    called: str,
+    num_envs: int,
+    engine: str,
+    steps: int,
+    solver: Callable[[TaskEnv], Callable[[], object]] | None = None,
+) -> FamilyCost:
+    """The same in a world whose family or object `matter` is called so in the table.
+
+    `solver` gives what makes one physics step of the solver alone, from what matter is like in the first env.
+    """
     with _made(world, engine, num_envs) as env:
         env.reset(seed=0)
         action = np.zeros((num_envs, 0))
         _run(lambda: env.step(action), SETTLE)
         cpu, wall = _run(lambda: env.step(action), steps)
+        bare_solver = None if solver is None else 1.0 / _run(solver(env), SUBSTEPS * steps)[0]
         if world["families"]:
             assert env.families is not None
             there = env.families.state("matter").points.shape[1]
@@ -97,7 +111,8 @@ def cost_in(world: dict[str, Any], called: str, num_envs: int, engine: str, step
         alone, _ = _run(lambda: env.engine.step(SUBSTEPS), 20)
         one, _ = _run(lambda: [env.engine.step(1) for _ in range(SUBSTEPS)], 20)
     done = SUBSTEPS * num_envs
-    return FamilyCost(engine, called, there, num_envs, done / cpu, done / wall, done / alone, done / one)
+    rates = done / cpu, done / wall, done / alone, done / one
+    return FamilyCost(engine, called, there, num_envs, *rates, bare_solver)
 
 
 def _made(world: dict[str, Any], engine: str, num_envs: int) -> Any:

@@ -51,6 +51,7 @@ def print_costs(found: "Sequence[FamilyCost]", *, json: bool) -> None:
         print_json([one._asdict() for one in found])
         return
     heads = ("engine", "family", "points", "envs", "steps/s (cpu)", "steps/s (wall)", "alone", "alone, one by one")
+    heads = (*heads, "solver alone") if any(one.solver for one in found) else heads
     print_table(
         "Physics steps per second, of one env",
         heads,
@@ -64,6 +65,7 @@ def print_costs(found: "Sequence[FamilyCost]", *, json: bool) -> None:
                 f"{one.wall_per_second:,.0f}",
                 f"{one.alone:,.0f}",
                 f"{one.one_by_one:,.0f}",
+                *([f"{one.solver:,.0f}"] if one.solver else []),
             )
             for one in found
         ],

@@ -1,6 +1,12 @@
 """Costs of soft matter: on the ground, with a ball on top."""
 
+from collections.abc import Callable
 from typing import Any
+
+import mujoco
+
+from anysim.task.env import TaskEnv
+from anysim_soft.family import Soft
 
 MATTER: dict[str, dict[str, Any]] = {
     "block": {"kind": "deformable", "box": [0.2, 0.2, 0.2], "points": [8, 8, 8]},
@@ -23,3 +29,13 @@ def world_of(called: str) -> dict[str, Any]:
         "layout": {"ball": {"position": [0.0, 0.0, HEIGHTS[matter["kind"]]]}},
         "families": {"matter": matter},
     }
+
+
+def solver_of(env: TaskEnv) -> Callable[[], object]:
+    """What makes one physics step of MuJoCo alone, from what matter is like in the first env."""
+    assert env.families is not None
+    it = env.families.family("matter")
+    assert isinstance(it, Soft)
+    sub = it.sub_world(0)
+    sub.load(it.state_row[0])
+    return lambda: mujoco.mj_step(sub.model, sub.data, nstep=it.soft.substeps)

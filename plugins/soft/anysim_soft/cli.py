@@ -16,17 +16,18 @@ def soft(
 ) -> None:
     """Physics steps of one env per second of processor time, with soft matter on the ground and a ball on top of it.
 
-    The columns are those of `anysim bench families`.
+    The columns are those of `anysim bench families`, and a last one: the steps of MuJoCo alone, with the same model and
+    state, and neither the coupling to bodies nor an engine around it.
 
     Examples:
       anysim bench soft --engine mujoco,pybullet,sapien --num-envs 1
     """
     from anysim_particles.bench import cost_in
     from anysim_particles.cli import print_costs
-    from anysim_soft.bench import MATTER, world_of
+    from anysim_soft.bench import MATTER, solver_of, world_of
 
     found = [
-        cost_in(world_of(called), called, envs, name, steps)
+        cost_in(world_of(called), called, envs, name, steps, solver_of)
         for name in parts(engine, "--engine")
         for called in parts(cases or ",".join(MATTER), "--cases", MATTER)
         for envs in numbers(num_envs, "--num-envs", int, 1)

@@ -169,17 +169,17 @@ class Soft(CoSolver):
         self.frame[env_ids] = np.concatenate([place, P.from_axis_angle(UP, yaw)], axis=1)
         poses = self.engine.get_state().body_pose[:, self.met[self._holders]]
         for env in env_ids.tolist():
-            one = self._world(env)
+            one = self.sub_world(env)
             if len(self._nodes):
                 one.load(one.beginning())
                 away = one.node_places()[self._nodes] - poses[env, :, :3]
                 self.anchors[env] = P.rotate_inverse(poses[env, :, 3:], away)
-                one = self._world(env)
+                one = self.sub_world(env)
             self.state_row[env] = one.beginning()
             one.load(self.state_row[env])
             self.x[env] = one.points()
 
-    def _world(self, env: int) -> SubWorld:
+    def sub_world(self, env: int) -> SubWorld:
         """The model of an env: all that it is made of is in the memory, and it is made anew when that has changed."""
         parts = (self.values, self.frame, self.anchors, self._mass, self._com, self._inertia)
         key = b"".join(part[env].tobytes() for part in parts)
@@ -208,7 +208,7 @@ class Soft(CoSolver):
             env = int(env_ids[row])
             if not np.isfinite(self.state_row[env]).all():
                 return
-            sub = self._world(env)
+            sub = self.sub_world(env)
             sub.take(self.state_row[env])
             sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
             if len(self.pads):

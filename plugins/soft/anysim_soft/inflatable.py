@@ -122,7 +122,7 @@ class Inflatable(Soft):
                     f"%, and its law holds up to {100 * MOST_STRAIN:g} %; take a lower `pressure`, or more of `young` "
                     f"or `thickness`"
                 )
-            sub = self._world(env)
+            sub = self.sub_world(env)
             sub.load(self.state_row[env])
             sub.stretch(1.0 + strain)
             self.state_row[env], self.x[env] = sub.state(), sub.points()
@@ -136,7 +136,7 @@ class Inflatable(Soft):
 
     def skin(self, env: int) -> Skin:
         """What liquids meet of it in an env."""
-        return Skin(self.x[env], self.v[env], self._world(env).mass, self._faces, self._spec.skin)
+        return Skin(self.x[env], self.v[env], self.sub_world(env).mass, self._faces, self._spec.skin)
 
     def splash(self, env: int, impulse: Array) -> None:
         """Its points get impulses (V, 3) [N s] from a liquid."""
