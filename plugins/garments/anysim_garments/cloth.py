@@ -38,6 +38,7 @@ class Cloth:
         flat: (V, 2) where its points are in its own plane, -1 to 1.
         faces: (F, 3) its triangles.
         area: [m^2] of its outline as it lies flat.
+        pinched: a hand holds it by friction, which takes it some time to close.
     """
 
     def __init__(self, scene: SceneView, category: CategoryView) -> None:
@@ -49,6 +50,7 @@ class Cloth:
         if "flat" not in state.fields:
             raise TaskError(f"'{self.name}' is no garment: its points have no place in a plane of its own")
         flat = state.fields["flat"][0]
+        self.pinched = "pinched" in state.fields
         self._half = np.ptp(flat, axis=0) / 2
         self.flat, self.faces = flat / self._half, state.faces
         lying = np.column_stack([flat, np.zeros(len(flat))])[None]
@@ -84,7 +86,7 @@ class Cloth:
         """
         state = self.state()
         held = state.fields["held"][at, numbers]
-        if "pinched" in state.fields:
+        if self.pinched:
             points = state.points[at]
             away = P.norm(points - points[np.arange(len(at)), numbers, None])
             held = held | np.logical_or.reduce(state.fields["pinched"][at] & (away < GATHERED), axis=1)

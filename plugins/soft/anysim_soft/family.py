@@ -216,8 +216,8 @@ class Soft(CoSolver):
             sub.place()
             if len(self.pads):
                 sub.hold(*self.pads.held(env))
-                shut = self.pads.shut(joint_pos[row])
-                sub.jaws.drive(sub.data, self.pads.openings(joint_pos[row]), shut, bodies.friction[row])
+                shut, openings = self.pads.shut(joint_pos[row]), self.pads.openings(joint_pos[row])
+                sub.jaws.drive(sub.data, openings, shut, bodies.friction[row], duration)
             done = sub.step(self.soft.substeps, self.parameter("drag", env), env)
             if len(self.pads):
                 self.pads.felt(env, sub.pulls())

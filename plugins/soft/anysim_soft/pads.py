@@ -21,6 +21,8 @@ STAGES = ("open", "holding", "empty")
 """A pad that has closed on nothing, or whose cloth came off, is empty until it opens; one that pinches while it is so."""
 PRESSED = 0.5
 """Of its force, with which both pads press when a pinch begins: slip is measured from there."""
+TOUCHING = 0.001
+"""[m] between pads that have closed on nothing."""
 PINCHED = 32
 """Points between the pads of a pinch that are remembered at most, those nearest to its frame."""
 
@@ -156,27 +158,31 @@ class Pads:
     def pinched(self, env: int, points: Array, faces: Array, shut: Array, pressed: Sequence[Pressed]) -> None:
         """Note what is between pads: points are at (V, 3) [m] and make triangles (F, 3); `shut` (J,): hands are closed."""
         for number, closed, found in zip(self._pinching.tolist(), shut.tolist(), pressed, strict=True):
-            both, known = float(found.force.min()), int(self._known[env, number])
+            both, known = float(found.force.min()), int(self._known[env, number]) if closed else 0
             self.force[env, number], self._count[env, number] = found.force.mean() if closed else 0.0, 0
-            if not closed:
-                self.stage[env, number], self._known[env, number], self.slip[env, number] = OPEN, 0, 0.0
-                continue
-            self.stage[env, number] = HOLDING if both > 0.0 else EMPTY
-            if both > 0.0:
+            if closed and not known and found.resting and both >= PRESSED * self.specs[number].force:
+                known = min(len(found.faces), self._most)
+                corners = points[faces[found.faces[:known]]]
+                self._spots[env, number, :known] = found.faces[:known]
+                self._shares[env, number, :known] = shares = _shares(corners, found.places[:known])
+                self._anchors[env, number, :known] = _in_hand(shares, corners, found.hand)
+            self._known[env, number] = known
+            self.slip[env, number] = self._slipped(env, number, points, faces, found.hand) if known else 0.0
+            if known and both > 0.0:
                 tool = found.hand[:3] + P.rotate(found.hand[3:], np.array(self._frames[number].position))
                 held = np.unique(faces[found.faces])
                 held = held[np.argsort(P.norm(points[held] - tool), kind="stable")[: self._most]]
                 self._count[env, number], self._nodes[env, number, : len(held)] = len(held), held
-            if not known and found.resting and both >= PRESSED * self.specs[number].force:
-                known = min(len(found.faces), self._most)
-                self._known[env, number], self._spots[env, number, :known] = known, found.faces[:known]
-                corners = points[faces[found.faces[:known]]]
-                self._shares[env, number, :known] = shares = _shares(corners, found.places[:known])
-                self._anchors[env, number, :known] = _in_hand(shares, corners, found.hand)
-            if known:
-                corners = points[faces[self._spots[env, number, :known]]]
-                now = _in_hand(self._shares[env, number, :known], corners, found.hand)
-                self.slip[env, number] = np.median(P.norm(now - self._anchors[env, number, :known]))
+                self.stage[env, number] = HOLDING
+            else:
+                self.stage[env, number] = EMPTY if known or (closed and found.gap < TOUCHING) else OPEN
+
+    def _slipped(self, env: int, number: int, points: Array, faces: Array, hand: Array) -> float:
+        """[m] how far what was between the pads at first has moved in the hand: the median."""
+        spots = slice(int(self._known[env, number]))
+        corners = points[faces[self._spots[env, number, spots]]]
+        moved = _in_hand(self._shares[env, number, spots], corners, hand) - self._anchors[env, number, spots]
+        return float(np.median(P.norm(moved)))
 
     # ------------------------------------------------------------------ what others see
 

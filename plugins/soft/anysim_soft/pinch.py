@@ -4,7 +4,7 @@ A pad goes where the engine's finger is, by a servo whose force is limited: clot
 meets nothing, goes on closing. The two stay as far from the middle as each other, as fingers do that one drive moves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -24,6 +24,8 @@ RUBBER = {"solref": [2.0, 1.0], "solimp": [0.999, 0.9999, 0.001, 0.5, 2.0]}
 """Contact of a pad, its time in steps: points of cloth weigh so little that any softer one lets pads through."""
 OPTIONS = {"solver": "Newton", "impratio": 10}
 """Attributes of `option`: conjugate gradients do not converge on contacts as stiff as these."""
+SPEED = 0.1
+"""[m/s] of a pad at most: fingers of an engine may snap shut, under which cloth is not gathered but passed over."""
 RESTING = 0.01
 """[m/s] of a pad that neither closes nor opens."""
 STEP = 0.002
@@ -64,6 +66,7 @@ class Pressed(NamedTuple):
         faces: (n,) the triangles that touch them, one for each contact.
         places: (n, 3) [m] where.
         hand: (7,) pose of the hand's body.
+        gap: [m] between the pads.
         resting: the pads neither close nor open.
     """
 
@@ -71,6 +74,7 @@ class Pressed(NamedTuple):
     faces: Array
     places: Array
     hand: Array
+    gap: float
     resting: bool
 
 
@@ -154,23 +158,30 @@ class Jaws:
     def __init__(self, model: Any, jaws: Sequence[Jaw], friction: float) -> None:
         """`friction` is that of the cloth; the larger of the two coefficients acts."""
         self._jaws, self._model, self._friction = jaws, model, friction
-        names = [[f"pad {number} {end}" for end in range(2)] for number in range(len(jaws))]
-        self._joints = np.array([[model.joint(name).id for name in pair] for pair in names], dtype=np.intp)
-        self._dofs = np.array([[model.joint(name).dofadr[0] for name in pair] for pair in names], dtype=np.intp)
-        self._rows = np.array([[model.joint(name).qposadr[0] for name in pair] for pair in names], dtype=np.intp)
-        self._drives = np.array([[model.actuator(name).id for name in pair] for pair in names], dtype=np.intp)
-        self._geoms = np.array([[model.geom(name).id for name in pair] for pair in names], dtype=np.intp)
+
+        def pairs(number_of: Callable[[str], int]) -> Array:
+            found = [[number_of(f"pad {number} {end}") for end in range(2)] for number in range(len(jaws))]
+            return np.array(found, dtype=np.intp).reshape(-1, 2)
+
+        self._joints, self._geoms = pairs(lambda name: model.joint(name).id), pairs(lambda name: model.geom(name).id)
+        self._drives = pairs(lambda name: model.actuator(name).id)
+        self._rows, self._dofs = model.jnt_qposadr[self._joints], model.jnt_dofadr[self._joints]
         self._pairs = np.array([model.equality(f"jaw {number}").id for number in range(len(jaws))], dtype=np.intp)
         self._hands = np.array([model.body(f"met {jaw.place}").id for jaw in jaws], dtype=np.intp)
         self._preload = np.array([jaw.force for jaw in jaws]) / (STIFFNESS * MASS / model.opt.timestep**2)
 
     def begin(self, data: Any, openings: Array) -> None:
         """Put the pads (J, 2) [m] from the middle."""
-        data.qpos[self._rows] = openings
+        data.qpos[self._rows] = data.ctrl[self._drives] = openings
 
-    def drive(self, data: Any, openings: Array, closed: Array, friction: Array) -> None:
-        """Have pads go (J, 2) [m] from the middle, or press, where closed (J,) bool; `friction` (G,) of the World's."""
-        data.ctrl[self._drives] = openings - np.where(closed, self._preload, 0.0)[:, None]
+    def drive(self, data: Any, openings: Array, closed: Array, friction: Array, duration: float) -> None:
+        """Have pads go (J, 2) [m] from the middle, or press, where closed (J,) bool, for so long [s].
+
+        `friction` (G,) of the World's geoms.
+        """
+        most, before = SPEED * duration, data.ctrl[self._drives]
+        goal = openings - np.where(closed, self._preload, 0.0)[:, None]
+        data.ctrl[self._drives] = np.clip(goal, before - most, before + most)
         self._model.eq_data[self._pairs, 0] = openings[:, 0] - openings[:, 1]
         for ids, jaw in zip(self._geoms, self._jaws, strict=True):
             for geom, rubber in zip(ids, jaw.geoms, strict=True):
@@ -193,5 +204,6 @@ class Jaws:
             resting = bool(np.abs(data.qvel[self._dofs[number]]).max() < RESTING)
             rows = np.concatenate(touching)
             faces, places = data.contact.elem[rows].max(axis=1), data.contact.pos[rows].copy()
-            found.append(Pressed(force, faces, places, pose, resting))
+            gap = float(data.qpos[self._rows[number]].sum())
+            found.append(Pressed(force, faces, places, pose, gap, resting))
         return found
