@@ -20,13 +20,16 @@ from anysim_garments.grasp import ClothGrasp
 from anysim_skills.arm import Arm
 from anysim_soft.garment import Garment
 
-TOWEL: dict[str, Any] = {"kind": "garment", "towel": [0.3, 0.3], "spacing": 0.03, "areal_density": {"range": [0.233, 0.433]}}
-TOWEL |= {"position": {"range": [[0.49, -0.01, 0.004], [0.51, 0.01, 0.004]]}, "damping": 0.05, "drag": 1.5, "friction": 0.4}
+TOWEL: dict[str, Any] = {"kind": "garment", "towel": [0.3, 0.3], "spacing": 0.03, "damping": 0.05, "drag": 1.5}
+TOWEL |= {"position": {"range": [[0.49, -0.01, 0.004], [0.51, 0.01, 0.004]]}, "friction": 0.4}
+TOWEL |= {"areal_density": {"range": [0.233, 0.433]}}
 PAD = {"tool": "panda.tool", "joint": "panda.panda_finger_joint1", "closed": 0.008}
 ARM = {"controller": "joint_delta_position", "params": {"scale": 0.06}}
 PANDA = {"robot": "franka_panda", "actions": {"arm": ARM, "eef": "gripper_binary"}}
-WAY = ((0.0, 0.25, 80), (0.1, 0.25, 25), (-0.1, 0.25, 40), (0.1, 0.25, 40), (-0.1, 0.25, 40), (0.0, 0.25, 25), (0.0, 0.25, 50))
-"""[m] aside and above where it was grasped, and control steps of 20 ms."""
+LIFT = 0.25
+"""[m] above where it was grasped."""
+WAY = ((0.0, 80), (0.1, 25), (-0.1, 40), (0.1, 40), (-0.1, 40), (0.0, 25), (0.0, 50))
+"""[m] aside, and control steps of 20 ms."""
 OK = OUTCOMES.index(Outcome.OK)
 
 
@@ -75,8 +78,8 @@ def shaken(engine: str, seeds: int, **pad: Any) -> Held:
             env.scene.look(None)
             env.step(action)
         first = arm.command.copy()
-        for aside, above, steps in WAY:
-            target = first + np.array([0.0, aside, above, 0.0, 0.0, 0.0, 0.0])
+        for aside, steps in WAY:
+            target = first + np.array([0.0, aside, LIFT, 0.0, 0.0, 0.0, 0.0])
             for _ in range(steps):
                 env.scene.look(None)
                 arm.go(ids, target, 0.3)

@@ -18,8 +18,7 @@ from anysim_soft.deformable import contact_of, numbers, on_side
 from anysim_soft.family import UP, Soft
 from anysim_soft.garment_cut import Cut, cut_of
 from anysim_soft.garment_spec import GarmentSpec
-from anysim_soft.pinch import OPTIONS as PINCH
-from anysim_soft.pinch import STEP
+from anysim_soft.pinch import OPTIONS as PINCH, STEP
 from anysim_soft.rope import edges
 from anysim_soft.spec import PadSpec, SoftSpec
 from anysim_soft.subworld import FlexSource

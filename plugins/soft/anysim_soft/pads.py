@@ -18,7 +18,7 @@ from anysim_soft.subworld import Slots
 
 OPEN, HOLDING, EMPTY = 0, 1, 2
 STAGES = ("open", "holding", "empty")
-"""A pad that has closed on nothing, or whose cloth came off, is empty until it opens; one that pinches while it is so."""
+"""A pad that has closed on nothing, or whose cloth came off, is empty until it opens; one that pinches, while it is."""
 PRESSED = 0.5
 """Of its force, with which both pads press when a pinch begins: slip is measured from there."""
 TOUCHING = 0.001
@@ -32,7 +32,8 @@ class Pads:
 
     Attributes:
         stage: (N, P) an index into STAGES.
-        force: (N, P) [N] with which it pulls at each.
+        force: (N, P) [N] with which it pulls at each, or with which each of two pads presses that pinch.
+        slip: (N, P) [m] of a pinch: how far what was between the pads at first has moved in the hand, the median.
     """
 
     stage: Array
@@ -97,9 +98,7 @@ class Pads:
     def _jaw(self, pad: int, number: Mapping[int, int]) -> Jaw:
         frame, spec = self._frames[pad], self.specs[pad]
         try:
-            return jaw_of(
-                self._world, frame, int(self._joints[pad]), number[frame.body], spec.size, spec.force
-            )
+            return jaw_of(self._world, frame, int(self._joints[pad]), number[frame.body], spec.size, spec.force)
         except PluginError as error:
             raise PluginError(f"{self._path}.{self.names[pad]}.joint: {error}") from None
 
@@ -156,7 +155,7 @@ class Pads:
         return joint_pos[self._joints[self._pinching]] <= self._closed[self._pinching]
 
     def pinched(self, env: int, points: Array, faces: Array, shut: Array, pressed: Sequence[Pressed]) -> None:
-        """Note what is between pads: points are at (V, 3) [m] and make triangles (F, 3); `shut` (J,): hands are closed."""
+        """Note what is between pads, of points (V, 3) [m] and triangles (F, 3); `shut` (J,): which hands are closed."""
         for number, closed, found in zip(self._pinching.tolist(), shut.tolist(), pressed, strict=True):
             both, known = float(found.force.min()), int(self._known[env, number]) if closed else 0
             self.force[env, number], self._count[env, number] = found.force.mean() if closed else 0.0, 0
@@ -187,7 +186,7 @@ class Pads:
     # ------------------------------------------------------------------ what others see
 
     def points(self, env_ids: Array, count: int, *, pinched: bool = False) -> Array:
-        """(n, V) bool: which of `count` points are held, or pinched: points of triangles between the pads of a pinch."""
+        """(n, V) bool: which of `count` points are held, or pinched: those of triangles that such pads press on."""
         found = np.zeros((len(env_ids), count), dtype=bool)
         for number in self._pinching.tolist() if pinched else range(len(self)):
             holding = np.arange(self._most) < self._count[env_ids, number, None]

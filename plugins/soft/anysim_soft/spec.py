@@ -122,6 +122,10 @@ class RopeSpec(SoftSpec):
         corners = zip(self.path, self.path[1:], strict=False)
         if min(sum((a - b) ** 2 for a, b in zip(p, q, strict=True)) for p, q in corners) < 1e-12:
             raise KeyFault("two corners that follow each other are at one place", "path")
+        if pinching := [name for name, pad in (self.pads or {}).items() if pad.grip == "pinch"]:
+            raise KeyFault(
+                f"friction holds garments alone, a rope sticks to the pad '{pinching[0]}'; leave `grip` out", "pads"
+            )
         return self
 
 
