@@ -12,7 +12,7 @@ from anysim.conventions import Array
 from anysim.errors import AnysimError, PluginError
 from anysim.families.base import Family, FamilySetting
 from anysim.math import pose as P
-from anysim_soft.pinch import Jaw, Pressed, jaw_of
+from anysim_soft.pinch import Jaw, PadContact, jaw_of
 from anysim_soft.spec import PadSpec
 from anysim_soft.subworld import Slots
 
@@ -154,7 +154,7 @@ class Pads:
         """(J,) bool: the hands that pinch are closed."""
         return joint_pos[self._joints[self._pinching]] <= self._closed[self._pinching]
 
-    def pinched(self, env: int, points: Array, faces: Array, shut: Array, pressed: Sequence[Pressed]) -> None:
+    def pinched(self, env: int, points: Array, faces: Array, shut: Array, pressed: Sequence[PadContact]) -> None:
         """Note what is between pads, of points (V, 3) [m] and triangles (F, 3); `shut` (J,): which hands are closed."""
         for number, closed, found in zip(self._pinching.tolist(), shut.tolist(), pressed, strict=True):
             both, known = float(found.force.min()), int(self._known[env, number]) if closed else 0

@@ -58,7 +58,7 @@ class Jaw(NamedTuple):
     geoms: tuple[tuple[int, ...], tuple[int, ...]]
 
 
-class Pressed(NamedTuple):
+class PadContact(NamedTuple):
     """What a jaw presses on.
 
     Attributes:
@@ -187,7 +187,7 @@ class Jaws:
             for geom, rubber in zip(ids, jaw.geoms, strict=True):
                 self._model.geom_friction[geom, 0] = max(friction[list(rubber)].max(), self._friction)
 
-    def pressed(self, data: Any) -> list[Pressed]:
+    def pressed(self, data: Any) -> list[PadContact]:
         """What each presses on, in the last substep."""
         geoms, first = data.contact.geom, data.contact.efc_address
         found = []
@@ -205,5 +205,5 @@ class Jaws:
             rows = np.concatenate(touching)
             faces, places = data.contact.elem[rows].max(axis=1), data.contact.pos[rows].copy()
             gap = float(data.qpos[self._rows[number]].sum())
-            found.append(Pressed(force, faces, places, pose, gap, resting))
+            found.append(PadContact(force, faces, places, pose, gap, resting))
         return found
