@@ -24,6 +24,8 @@ NEAR = 0.015
 """[m] within which a point lies as it should."""
 ASIDE = 0.012
 """[m] that a hand may come down beside the point that it is to hold."""
+GATHERED = 0.06
+"""[m] from a point on a bulge to where fingers pinch the cloth below."""
 _TURNS = np.arange(16) * np.pi / 8
 ASIDES = np.concatenate([np.zeros((1, 2)), ASIDE * np.stack([np.cos(_TURNS), np.sin(_TURNS)], axis=1)])
 """(17, 2) [m] places that are tried."""
@@ -36,6 +38,7 @@ class Cloth:
         flat: (V, 2) where its points are in its own plane, -1 to 1.
         faces: (F, 3) its triangles.
         area: [m^2] of its outline as it lies flat.
+        pinched: a hand holds it by friction, which takes it some time to close.
     """
 
     def __init__(self, scene: SceneView, category: CategoryView) -> None:
@@ -47,6 +50,7 @@ class Cloth:
         if "flat" not in state.fields:
             raise TaskError(f"'{self.name}' is no garment: its points have no place in a plane of its own")
         flat = state.fields["flat"][0]
+        self.pinched = "pinched" in state.fields
         self._half = np.ptp(flat, axis=0) / 2
         self.flat, self.faces = flat / self._half, state.faces
         lying = np.column_stack([flat, np.zeros(len(flat))])[None]
@@ -76,8 +80,17 @@ class Cloth:
         return points[rows, numbers] + asides[np.argmax(lead, axis=1)]
 
     def holds(self, at: Array, numbers: Array) -> Array:
-        """(n,) bool: a pad holds points `numbers` (n,) in the rows `at` of the scene."""
-        return self.state().fields["held"][at, numbers]
+        """(n,) bool: a pad holds points `numbers` (n,) in the rows `at` of the scene, or pinches the cloth near them.
+
+        Fingers that pinch gather what lies between them: the point that they came for is then on the bulge above them.
+        """
+        state = self.state()
+        held = state.fields["held"][at, numbers]
+        if self.pinched:
+            points = state.points[at]
+            away = P.norm(points - points[np.arange(len(at)), numbers, None])
+            held = held | np.logical_or.reduce(state.fields["pinched"][at] & (away < GATHERED), axis=1)
+        return held
 
     def held_near(self, places: Array, within: float = 0.06) -> Array:
         """(n,) bool: a pad holds it at a point within so much [m] of places (n, 3)."""

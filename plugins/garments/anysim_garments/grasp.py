@@ -89,7 +89,8 @@ class ClothGrasp(PhasedSkill):
     def _closing(self, ids: Array, at: Array) -> Array:
         held = self.cloth.holds(at, self.numbers[ids])
         still = (self.steps[ids] >= 10) & (self.arm.finger_speed(ids) < CLOSED)
-        over = (still & ~held) | (self.steps[ids] >= CLOSING_STEPS)
+        missed = still & ~held & (not self.cloth.pinched)  # pads that pinch come after the fingers
+        over = missed | (self.steps[ids] >= CLOSING_STEPS)
         return np.where(held & still, GO_ON, np.where(over, _MISSED, STAY))
 
     def _raise(self, ids: Array, at: Array) -> None:

@@ -119,7 +119,7 @@ class Soft(CoSolver):
         self.x, self.v = self.remember("x", size, 3), self.remember("v", size, 3)
         self.moved, self.state_row = self.remember("moved", 6), self.remember("state", example.state_size)
         if len(self.pads):
-            self.pads.remember(self, size)
+            self.pads.remember(self, size, len(self.faces))
 
     def _joints(self, anchors: Array) -> list[Joint]:
         rows = zip(self._nodes.tolist(), self._holders.tolist(), anchors, strict=True)
@@ -167,7 +167,8 @@ class Soft(CoSolver):
             place = pose[:, :3] + P.rotate(P.from_axis_angle(UP, heading), place)
             yaw = yaw + heading
         self.frame[env_ids] = np.concatenate([place, P.from_axis_angle(UP, yaw)], axis=1)
-        poses = self.engine.get_state().body_pose[:, self.met[self._holders]]
+        now = self.engine.get_state()
+        poses, joint_pos = now.body_pose[:, self.met[self._holders]], now.joint_pos
         for env in env_ids.tolist():
             one = self.sub_world(env)
             if len(self._nodes):
@@ -175,7 +176,7 @@ class Soft(CoSolver):
                 away = one.node_places()[self._nodes] - poses[env, :, :3]
                 self.anchors[env] = P.rotate_inverse(poses[env, :, 3:], away)
                 one = self.sub_world(env)
-            self.state_row[env] = one.beginning()
+            self.state_row[env] = one.beginning(self.pads.openings(joint_pos[env]))
             one.load(self.state_row[env])
             self.x[env] = one.points()
 
@@ -201,8 +202,9 @@ class Soft(CoSolver):
         twist = bodies.twist.copy()
         twist[..., :3] -= P.cross(twist[..., 3:], bodies.com - pose[:, met, :3])
         impulse = np.zeros((len(env_ids), len(met), 6))
+        joint_pos = self.engine.get_state().joint_pos[env_ids]
         if len(self.pads):
-            self.pads.look(env_ids, self.x[env_ids], pose, self.engine.get_state().joint_pos[env_ids])
+            self.pads.look(env_ids, self.x[env_ids], pose, joint_pos)
 
         def one(row: int) -> None:
             env = int(env_ids[row])
@@ -213,9 +215,12 @@ class Soft(CoSolver):
             sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
             if len(self.pads):
                 sub.hold(*self.pads.held(env))
+                shut, openings = self.pads.shut(joint_pos[row]), self.pads.openings(joint_pos[row])
+                sub.jaws.drive(sub.data, openings, shut, bodies.friction[row], duration)
             done = sub.step(self.soft.substeps, self.parameter("drag", env), env)
             if len(self.pads):
                 self.pads.felt(env, sub.pulls())
+                self.pads.pinched(env, sub.points(), sub.faces, shut, sub.jaws.pressed(sub.data))
             self.after_solve(env, sub)
             self.received[env] += done.received
             self.state_row[env], self.moved[env] = sub.state(), sub.momentum()

@@ -18,6 +18,7 @@ from anysim_soft.deformable import contact_of, numbers, on_side
 from anysim_soft.family import UP, Soft
 from anysim_soft.garment_cut import Cut, cut_of
 from anysim_soft.garment_spec import GarmentSpec
+from anysim_soft.pinch import OPTIONS as PINCH, STEP
 from anysim_soft.rope import edges
 from anysim_soft.spec import PadSpec, SoftSpec
 from anysim_soft.subworld import FlexSource
@@ -36,6 +37,8 @@ STABLE = 2.0
 """Of the square of a step times the rate of the fastest bending wave, below which cloth does not come apart: 4."""
 EDGE = "0.95 0.99 0.001"
 """Impedance of edges: stiffer ones take a solver that is some times slower."""
+PINCHED_EDGE = "0.99 0.999 0.001"
+"""The same where pads pinch: softer edges give way to them by a third of their length, and pads come through cloth."""
 
 
 class Garment(Soft):
@@ -64,6 +67,12 @@ class Garment(Soft):
         self._matrix = bending_matrix(self.cut.points, self.cut.hinges)
         self._rate = fastest(self._matrix, self.cut.shares())
         super().__init__(setting)
+        if self.pads.pinch and self._step > STEP * (1 + 1e-9):
+            least = int(np.ceil(setting.engine.world.physics.dt / STEP - 1e-9))
+            raise PluginError(
+                f"world.families.{setting.name}.substeps: a pinch takes steps of {STEP:g} s at most, these are of "
+                f"{self._step:g} s; give `substeps: {least}` or more"
+            )
 
     @classmethod
     def pads_of(cls, spec: SoftSpec) -> Mapping[str, PadSpec]:
@@ -118,7 +127,7 @@ class Garment(Soft):
         xml = (
             f'<flexcomp name="it" type="direct" dim="2" point="{numbers(points.ravel())}" '
             f'element="{" ".join(map(str, cut.faces.ravel()))}" radius="{spec.radius!r}" mass="{float(mass.sum())!r}">'
-            f"{edges(self._step, EDGE)}{touch}</flexcomp>"
+            f"{edges(self._step, PINCHED_EDGE if self.pads.pinch else EDGE)}{touch}</flexcomp>"
         )
         begins = self._begins(flat, values["folded"], values["turned"], values["tilt"])
         start = None if begins is None else pose[:3] + P.rotate(pose[3:], begins)
@@ -126,6 +135,7 @@ class Garment(Soft):
         inner = bending_force(self._matrix, values["bending"], values["damping"], felt, self._step)
         sides = {side: on_side(cut.points, size, side) for side in spec.attached}
         options = EXACT if len(flat) <= FEW and not spec.layers else OPTIONS
+        options = OPTIONS | PINCH if self.pads.pinch else options
         return FlexSource(xml, fixed, mass, options, sides, start=start, inner=inner)
 
     def _begins(self, flat: Array, share: float, turned: float, tilt: float) -> Array | None:
@@ -156,10 +166,16 @@ class Garment(Soft):
         return self.parameter("areal_density", env) * float(self.cut.areas().sum())
 
     def state(self, env_ids: Array) -> FamilyState:
-        """Fields: `flat` (n, V, 2) [m] where each point is in the garment's own plane, `held` (n, V) by a pad."""
+        """Fields: `flat` (n, V, 2) [m] where each point is in the garment's own plane, `held` (n, V) by a pad.
+
+        Where a pad pinches it, `pinched` (n, V) too: held by one of these.
+        """
         state = super().state(env_ids)
         flat = np.broadcast_to(self.cut.points, (len(env_ids), *self.cut.points.shape))
-        return state._replace(fields={"flat": flat.copy(), "held": self.pads.points(env_ids, len(self.cut.points))})
+        fields = {"flat": flat.copy(), "held": self.pads.points(env_ids, len(self.cut.points))}
+        if self.pads.pinch:
+            fields["pinched"] = self.pads.points(env_ids, len(self.cut.points), pinched=True)
+        return state._replace(fields=fields)
 
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         more: dict[str, object] = {"area": float(self.cut.areas().sum()), "pads": self.pads.facts(env)}

@@ -57,7 +57,8 @@ class GarmentSpec(SoftSpec):
     radius: Positive = Field(default=0.003, description="[m] from its middle at which contacts act")
     layers: bool = Field(
         default=False,
-        description="whether parts that lie on each other touch, twice the radius apart; a pad then holds one point",
+        description="whether parts of it that lie on each other touch, twice the radius apart; a sticky pad then holds "
+        "one point",
     )
     fixed: tuple[Edge, ...] = Field(
         default=(), description="sides or corners of its outline that stay where they begin"
@@ -71,7 +72,8 @@ class GarmentSpec(SoftSpec):
     def _one_form(self) -> Self:
         if (self.towel is None) == (self.shirt is None):
             raise KeyFault("give one of `towel: [WIDTH, LENGTH]` and `shirt: {}`", "towel")
-        if self.layers and (wide := [name for name, pad in self.pads.items() if pad.points > 1]):
+        sticky = {name: pad for name, pad in self.pads.items() if pad.grip == "sticky"}
+        if self.layers and (wide := [name for name, pad in sticky.items() if pad.points > 1]):
             raise KeyFault(
                 f"layers that touch are pressed into each other between the points that the pad '{wide[0]}' holds, and "
                 f"the cloth comes apart; give it `points: 1`",

@@ -78,14 +78,25 @@ class DeformableSpec(SoftSpec):
 
 
 class PadSpec(Spec):
-    """A hand that cloth or a rope sticks to while it is closed; its links do not touch it otherwise."""
+    """A hand that cloth or a rope sticks to while it is closed, or that pinches cloth; its links do not touch it."""
 
-    tool: Reference = Field(description="the frame at which it sticks, such as `panda.tool`")
+    grip: Literal["sticky", "pinch"] = Field(
+        default="sticky",
+        description="whether the nearest points stick to it, or two pads on its fingers press on cloth, which friction "
+        "holds",
+    )
+    tool: Reference = Field(description="the frame at which it sticks, such as `panda.tool`, or in which pads meet")
     joint: Reference = Field(description="the joint that closes the hand, such as `panda.panda_finger_joint1`")
     closed: float = Field(default=0.01, description="position of that joint [m, rad] at or below which it is closed")
     reach: Positive = Field(default=0.02, description="how far from the frame it sticks when the hand closes [m]")
     points: Annotated[Integer, Field(ge=1, le=32)] = Field(default=5, description="that stick at most, the nearest")
-    force: Positive = Field(default=20.0, description="[N] beyond which it comes off, until the hand has opened")
+    force: Positive = Field(
+        default=20.0,
+        description="[N] beyond which it comes off, until the hand has opened; of a pinch with which each pad presses",
+    )
+    size: tuple[Positive, Positive, Positive] = Field(
+        default=(0.02, 0.016, 0.018), description="of a pinch, edges of each pad along the axes of `tool` [m]"
+    )
 
 
 class RopeSpec(SoftSpec):
@@ -111,6 +122,10 @@ class RopeSpec(SoftSpec):
         corners = zip(self.path, self.path[1:], strict=False)
         if min(sum((a - b) ** 2 for a, b in zip(p, q, strict=True)) for p, q in corners) < 1e-12:
             raise KeyFault("two corners that follow each other are at one place", "path")
+        if pinching := [name for name, pad in (self.pads or {}).items() if pad.grip == "pinch"]:
+            raise KeyFault(
+                f"friction holds garments alone, a rope sticks to the pad '{pinching[0]}'; leave `grip` out", "pads"
+            )
         return self
 
 

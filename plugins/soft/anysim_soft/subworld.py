@@ -18,6 +18,7 @@ from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_mujoco.geoms import add_assets, add_geom
 from anysim_soft.kernels import Exchange, account, even_rows
+from anysim_soft.pinch import Jaw, Jaws, add_jaw
 
 HEAVY = 1e4
 """[kg], [kg m^2] of a body that joints hold."""
@@ -70,10 +71,12 @@ class Slots(NamedTuple):
     Attributes:
         places: for each connection that can be made the place in `met` of its body.
         silent: places in `met` of bodies that do not touch the flex.
+        jaws: pads that pinch it.
     """
 
     places: Sequence[int] = ()
     silent: frozenset[int] = frozenset()
+    jaws: Sequence[Jaw] = ()
 
 
 NOTHING = Slots()
@@ -153,6 +156,7 @@ class SubWorld:
         self._geoms = np.array([model.geom(f"{i}").id for i in range(len(scenery.geoms))], dtype=np.intp)
         connects = np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_CONNECT))
         self._slots = connects[len(connects) - len(slots.places) :]
+        self.jaws = Jaws(model, slots.jaws, float(model.flex_friction[0, 0]))
         self.faces = _faces(model)
 
     @property
@@ -160,9 +164,11 @@ class SubWorld:
         """Numbers of a state."""
         return int(mujoco.mj_stateSize(self.model, STATE))
 
-    def beginning(self) -> Array:
-        """The state in which nothing has moved yet."""
+    def beginning(self, openings: Array | None = None) -> Array:
+        """The state in which nothing has moved yet, the pads of J jaws (J, 2) [m] from their middle."""
         mujoco.mj_resetData(self.model, self.data)
+        if openings is not None:
+            self.jaws.begin(self.data, openings)
         if self.source.start is not None:
             moving = self.model.body_dofnum[self.nodes] > 0
             first = self.model.jnt_qposadr[self.model.body_jntadr[self._moving]]
@@ -338,6 +344,9 @@ def _compiled(
         moments = np.array([HEAVY] * 3 + [0.0] * 3) if held else bodies.inertia[place]
         element.fullinertia = moments
         _add_shapes(spec, element, scenery.number[body], scenery, touches=place not in silent)
+        for number, jaw in enumerate(slots.jaws):
+            if jaw.place == place:
+                add_jaw(spec, element, number, jaw, dt)
     names = [model.body(body).name for body in nodes]
     held = [(joint.place, joint.node, True) for joint in joints] + [(place, 0, False) for place in slots.places]
     for place, node, active in held:
