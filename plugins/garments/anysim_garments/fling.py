@@ -43,7 +43,7 @@ class ClothFling(SkillSequence):
     """Fling `cloth` out with `robot` and `partner`, which stand side by side and take it at `at` and `partner_at`.
 
     They lift it until it hangs free, go apart until the edge between their hands is taut, swing it forward by `swing`
-    and back, lay it down while they draw back, and let go. What came off a hand is taken again.
+    and back, where they lay it down while they draw back, and let go. What came off a hand is taken again.
     """
 
     def __init__(
@@ -63,8 +63,10 @@ class ClothFling(SkillSequence):
         taut: Annotated[
             float, Field(ge=0.9, le=1, description="distance at which an edge is taut, by that when it lies flat")
         ] = 0.97,
+        out: Annotated[float, Field(description="[m] from where the hands are at home to where it turns")] = 0.08,
         swing: Metres = 0.25,
-        draw: Annotated[float, Field(ge=0, description="[m] that hands draw back beyond where the swing began")] = 0.1,
+        draw: Annotated[float, Field(ge=0, description="[m] that hands draw back beyond where the swing began")] = 0.03,
+        pause: Annotated[float, Field(ge=0, description="[s] for which the hands rest where the swing turns")] = 0.14,
         speed: Annotated[float, Field(gt=0, le=2, description="[m/s] of the hands in the middle of the swing")] = 1.0,
         above: Metres = 0.012,
         rounds: Annotated[int, Field(ge=1, description="times that it is taken at most")] = 3,
@@ -78,7 +80,9 @@ class ClothFling(SkillSequence):
         }
         members = {
             "grasp": AtOnce(env, grasp),
-            "fling": _Fling(env, tuple(grasp.values()), taut, swing, draw, speed, above),
+            "fling": _Fling(
+                env, tuple(grasp.values()), taut, (out - swing, out, out - swing - draw), pause, speed, above
+            ),
             "release": AtOnce(env, {"robot": Release(env, **one), "partner": Release(env, **other)}),
         }
         again = {("fling", Outcome.UNSTABLE_GRASP): "grasp"}
@@ -97,19 +101,22 @@ class _Fling(PhasedSkill):
         env: TaskEnv,
         grasps: Sequence[ClothGrasp],
         taut: float,
-        swing: float,
-        draw: float,
+        stations: tuple[float, float, float],
+        pause: float,
         speed: float,
         above: float,
     ) -> None:
+        """`stations` are where forward [m] the swing begins and turns, and where it is laid down."""
         self.arms: tuple[Arm, ...] = tuple(grasp.arm for grasp in grasps)
         self.cloth: Cloth = grasps[0].cloth
         self.numbers = np.array([grasp.numbers[0] for grasp in grasps])
         self.width, length = self.cloth.hanging(self.numbers)
         if self.width == 0.0:
             raise TaskError("cloth_fling stretches an edge, and `at` and `partner_at` are one point; give two corners")
-        self._taut, self._swing, self._draw, self._speed = taut, swing, draw, speed
+        self._taut, self._speed = taut, speed
+        self._start, self._turn, self._end = stations
         self._high, self._low = length + CLEAR, above
+        self._pause = pause
         self._dt = env.engine.world.physics.control_dt
         n = env.num_envs
         self._origin, self._axes, self._turns = np.zeros((n, 3)), np.zeros((n, 2, 2)), np.zeros((n, 2, 4))
@@ -125,6 +132,7 @@ class _Fling(PhasedSkill):
             Phase("stretch", None, self._stretching, 200),
             Phase("hang", None, self._hanging, SETTLING + 1),
             Phase("forward", self._begin, self._forward, 400),
+            Phase("turn", None, self._turning, int(self._pause / self._dt) + 2),
             Phase("lay", self._begin, self._laying, 600),
         )
 
@@ -149,11 +157,8 @@ class _Fling(PhasedSkill):
     def _reached(self, ids: Array, at: Array) -> Array:
         """Both arms come to where the swing begins and turns, and to where it is laid down."""
         del at
-        half = self._swing / 2
-        ways = [
-            self._places(ids, forward, up)
-            for forward, up in ((-half, self._high), (half, self._high), (-half - self._draw, self._low))
-        ]
+        stations = (self._start, self._high), (self._turn, self._high), (self._end, self._low)
+        ways = [self._places(ids, forward, up) for forward, up in stations]
         reached = np.ones(len(ids), dtype=bool)
         for number, arm in enumerate(self.arms):
             turns = self._turns[ids, number]
@@ -166,7 +171,7 @@ class _Fling(PhasedSkill):
         self._share[ids] = 0.0
 
     def _lifting(self, ids: Array, at: Array) -> Array:
-        begun, way = self._begun[ids], self._places(ids, -self._swing / 2, self._high) - self._begun[ids]
+        begun, way = self._begun[ids], self._places(ids, self._start, self._high) - self._begun[ids]
         there = self._along(ids, at, P.norm(way).max(axis=1), LIFTING)
         self._send(ids, begun + there[:, None, None] * way)
         return self._kept(at, np.where(self._share[ids] >= 1.0, GO_ON, STAY))
@@ -175,7 +180,7 @@ class _Fling(PhasedSkill):
         ends = self.cloth.state().points[at][:, self.numbers]
         taut = P.norm(ends[:, 0] - ends[:, 1]) >= self._taut * self.width
         self._gap[ids] += np.where(taut | (self._behind(ids, at) > BEHIND), 0.0, STRETCHING * self._dt)
-        self._send(ids, self._places(ids, -self._swing / 2, self._high))
+        self._send(ids, self._places(ids, self._start, self._high))
         return self._kept(at, np.where(taut, GO_ON, STAY))
 
     def _hanging(self, ids: Array, at: Array) -> Array:
@@ -184,14 +189,19 @@ class _Fling(PhasedSkill):
     # ------------------------------------------------------------------ forward, and back and down
 
     def _forward(self, ids: Array, at: Array) -> Array:
-        there = self._along(ids, at, self._swing, self._speed)
-        self._send(ids, self._places(ids, self._swing * (there - 0.5), self._high))
+        way = self._turn - self._start
+        there = self._along(ids, at, way, self._speed)
+        self._send(ids, self._places(ids, self._start + way * there, self._high))
         return self._kept(at, np.where(self._share[ids] >= 1.0, GO_ON, STAY))
 
+    def _turning(self, ids: Array, at: Array) -> Array:
+        """The cloth swings on while the hands rest: laid down at once, it comes to lie on itself."""
+        return self._kept(at, np.where(self.steps[ids] * self._dt >= self._pause - 1e-9, GO_ON, STAY))
+
     def _laying(self, ids: Array, at: Array) -> Array:
-        back, down = self._swing + self._draw, self._high - self._low
+        back, down = self._turn - self._end, self._high - self._low
         there = self._along(ids, at, float(np.hypot(back, down)), self._speed)
-        self._send(ids, self._places(ids, self._swing / 2 - back * there, self._high - down * there))
+        self._send(ids, self._places(ids, self._turn - back * there, self._high - down * there))
         over = self._share[ids] >= 1.0
         for arm in self.arms:
             over &= arm.arrived(ids, at, 0.01, 0.15) | arm.touching(ids, at)

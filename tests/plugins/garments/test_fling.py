@@ -68,10 +68,10 @@ def test_what_hangs_from_two_points_is_as_wide_and_as_long_as_it_is_cut() -> Non
         env.reset(seed=1)
         assert env.scene.families is not None
         cloth = Cloth(env.scene, env.scene.category("towel"))
-        assert cloth.hanging(cloth.nearest([(1, 1), (1, -1)])) == pytest.approx((0.3, 0.6))
-        assert cloth.hanging(cloth.nearest([(1, 1), (-1, 1)])) == pytest.approx((0.6, 0.3))
-        diagonal = float(np.hypot(0.6, 0.3))
-        assert cloth.hanging(cloth.nearest([(1, 1), (-1, -1)])) == pytest.approx((diagonal, 0.18 / diagonal))
+        assert cloth.hanging(cloth.nearest([(1, 1), (1, -1)])) == pytest.approx((0.3, 0.45))
+        assert cloth.hanging(cloth.nearest([(1, 1), (-1, 1)])) == pytest.approx((0.45, 0.3))
+        diagonal = float(np.hypot(0.45, 0.3))
+        assert cloth.hanging(cloth.nearest([(1, 1), (-1, -1)])) == pytest.approx((diagonal, 0.135 / diagonal))
 
 
 def test_a_fling_swings_a_taut_edge_as_fast_as_it_is_told_and_spreads_the_towel() -> None:
@@ -82,7 +82,8 @@ def test_a_fling_swings_a_taut_edge_as_fast_as_it_is_told_and_spreads_the_towel(
         if phase in seen:
             it, tools = towel(env), [env.scene.frame(f"{name}.tool") for name in ("panda", "partner")]
             ends = [
-                it.x[0, np.argmin(np.abs(it.cut.points - corner).sum(axis=1))] for corner in ([0.3, 0.15], [0.3, -0.15])
+                it.x[0, np.argmin(np.abs(it.cut.points - corner).sum(axis=1))]
+                for corner in ([0.225, 0.15], [0.225, -0.15])
             ]
             speeds = [np.linalg.norm(tool.twist[0, :3]) for tool in tools]
             step = tools[0].position[0] - tools[1].position[0]
@@ -104,7 +105,7 @@ def test_a_fling_swings_a_taut_edge_as_fast_as_it_is_told_and_spreads_the_towel(
 
 
 def test_without_a_swing_the_towel_stays_heaped() -> None:
-    with fling(FLING.format("panda", "partner", "[1, 1]", "[1, -1]", ", swing: 0, speed: 0.3")) as (env, policy):
+    with fling(FLING.format("panda", "partner", "[1, 1]", "[1, -1]", ", swing: 0, draw: 0.28")) as (env, policy):
         assert outcome(policy) is Outcome.OK
         assert share(env) < 0.7
 
@@ -137,7 +138,7 @@ def test_a_hand_that_finds_nothing_has_missed() -> None:
 
 
 def test_a_towel_that_is_longer_than_the_arms_lift_is_no_ik() -> None:
-    with fling("world.families.towel.towel=[1.2, 0.3]", "world.families.towel.folded=0.7") as (_, policy):
+    with fling("world.families.towel.towel=[1.2, 0.3]", "world.families.towel.folded=0.3") as (_, policy):
         assert outcome(policy) is Outcome.NO_IK
 
 
