@@ -18,12 +18,12 @@ from anysim_garments.fling import CLEAR
 from anysim_soft.garment import Garment
 from tests.tasks.states import blinding
 
-COARSE = [
-    f"world.families.towel.{key}={value}"
-    for key, value in (("spacing", 0.1), ("tilt", 0.0), ("yaw", 0.0), ("turned", 0.0), ("folded", 0.5))
-]
+FLAT = [f"world.families.towel.{key}" for key in ("tilt=0.0", "yaw=0.0", "turned=0.0", "folded=0.5")]
+COARSE = [*FLAT, "world.families.towel.spacing=0.1"]
+"""Few points are moved fast; to unfold as cloth does takes those of the task."""
 FLING = "collect.commands=[{{do: cloth_fling, robot: {}, partner: {}, cloth: towel, at: {}, partner_at: {}{}}}]"
 USUAL = FLING.format("panda", "partner", "[1, 1]", "[1, -1]", "")
+FINE = "world.families.towel.spacing=0.0375"
 Seen = Callable[[TaskEnv, str], None]
 
 
@@ -74,6 +74,7 @@ def test_what_hangs_from_two_points_is_as_wide_and_as_long_as_it_is_cut() -> Non
         assert cloth.hanging(cloth.nearest([(1, 1), (-1, -1)])) == pytest.approx((diagonal, 0.135 / diagonal))
 
 
+@pytest.mark.slow
 def test_a_fling_swings_a_taut_edge_as_fast_as_it_is_told_and_spreads_the_towel() -> None:
     """Both hands in step; free of the table before it swings; nothing pulled apart; nothing held in the end."""
     seen: dict[str, list[Array]] = {"hang": [], "forward": [], "lay": []}
@@ -90,7 +91,7 @@ def test_a_fling_swings_a_taut_edge_as_fast_as_it_is_told_and_spreads_the_towel(
             lowest = it.x[0, :, 2].min() - 0.4
             seen[phase].append(np.array([*speeds, np.linalg.norm(ends[0] - ends[1]), step[0], step[2], lowest]))
 
-    with fling(watch=watch) as (env, policy):
+    with fling(FINE, watch=watch) as (env, policy):
         assert outcome(policy) is Outcome.OK
         hang, forward, lay = (np.array(seen[phase]) for phase in ("hang", "forward", "lay"))
         assert 0.02 < hang[-1, 5] < 2 * CLEAR
@@ -104,12 +105,14 @@ def test_a_fling_swings_a_taut_edge_as_fast_as_it_is_told_and_spreads_the_towel(
         assert not towel(env).state(np.array([0])).fields["held"].any()
 
 
+@pytest.mark.slow
 def test_without_a_swing_the_towel_stays_heaped() -> None:
-    with fling(FLING.format("panda", "partner", "[1, 1]", "[1, -1]", ", swing: 0, draw: 0.28")) as (env, policy):
+    with fling(FLING.format("panda", "partner", "[1, 1]", "[1, -1]", ", swing: 0, draw: 0.28"), FINE) as (env, policy):
         assert outcome(policy) is Outcome.OK
         assert share(env) < 0.7
 
 
+@pytest.mark.slow
 def test_a_corner_that_comes_off_in_the_swing_is_an_unstable_grasp_or_taken_again() -> None:
     torn: list[bool] = []
 
@@ -123,14 +126,12 @@ def test_a_corner_that_comes_off_in_the_swing_is_an_unstable_grasp_or_taken_agai
         assert torn
         assert outcome(policy) is Outcome.UNSTABLE_GRASP
     torn.clear()
-    with fling(USUAL, "task.horizon=1500", watch=tear) as (env, policy):
+    with fling(USUAL, "task.horizon=1500", watch=tear) as (_, policy):
         assert outcome(policy) is Outcome.OK, policy.describe(0)
-        assert ("unstable_grasp", "back to grasp") in policy.skill.history(0) or "grasp" in str(
-            policy.skill.describe(0)
-        )
-        assert share(env) > 0.8
+        assert "unstable_grasp -> back to grasp" in str(policy.skill.describe(0)["ladder"])
 
 
+@pytest.mark.slow
 def test_a_hand_that_finds_nothing_has_missed() -> None:
     """With a reach of less than the height above cloth at which hands close."""
     with fling("world.families.towel.pads.partner.reach=0.001", "task.horizon=3000") as (_, policy):
