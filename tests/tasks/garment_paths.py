@@ -118,8 +118,11 @@ def take_hold(env: TaskEnv) -> None:
     env.scene.moment += 1
 
 
-def let_go(path: Callable[[TaskEnv, float], None]) -> Callable[[TaskEnv, float], None]:
-    """A way on which no pad holds it."""
+def freely(
+    goal: Callable[[TaskEnv], Array], start: Callable[[TaskEnv], Array] | None = None
+) -> Callable[[TaskEnv, float], None]:
+    """As `between`, and no pad holds it."""
+    path = between(goal, start)
 
     def free(env: TaskEnv, share: float) -> None:
         towel(env).pads.stage[:] = 0
@@ -127,3 +130,7 @@ def let_go(path: Callable[[TaskEnv, float], None]) -> Callable[[TaskEnv, float],
         path(env, share)
 
     return free
+
+
+HEAPED = crumple(0.8), take_hold
+"""What a towel that lies flat must not be."""

@@ -20,7 +20,7 @@ NEAR = 1e-5
 """[m, rad] engines keep poses in single precision."""
 ENGINES = ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.param("sapien", marks=pytest.mark.slow)]
 VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "unplug_charger", "go1_velocity_rough"}
-VARIANTS |= {"scoop_sand", "route_cable", "spread_towel", "fold_towel", "flatten_towel", "fold_shirt"}
+VARIANTS |= {"scoop_sand", "route_cable", "spread_towel", "fold_towel", "flatten_towel", "fling_towel", "fold_shirt"}
 """Those that differ from another task in sizes alone, or share its world, its matter or its way."""
 SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
@@ -31,7 +31,7 @@ SHIPPED = {"stand_still": 8, "go1_velocity": 8, "go1_velocity_rough": 4, "g1_vel
 SLOW = ("go1_velocity_rough", "g1_velocity")
 """Of these, what takes longer to try."""
 MATTER = ("pour_water", "scoop_sand", "route_cable", "hang_towel")
-MATTER += ("spread_towel", "fold_towel", "flatten_towel", "fold_shirt")
+MATTER += ("spread_towel", "fold_towel", "flatten_towel", "fling_towel", "fold_shirt")
 """Tasks whose matter pushes at things, which the engine without physics refuses: the model of these is MuJoCo.
 
 Their envs cost a hundred times as much as others: a few do."""

@@ -66,6 +66,17 @@ class Cloth:
         away = (self.flat[None] - np.array(spots)[:, None]) * self._half
         return np.argmin(P.norm(away), axis=1)
 
+    def hanging(self, numbers: Array) -> tuple[float, float]:
+        """[m] of cloth held at points `numbers` (2,): how far they are apart when taut, and how far down it hangs.
+
+        As it lies flat.
+        """
+        flat = self.flat * self._half
+        one, edge = flat[numbers[0]], flat[numbers[1]] - flat[numbers[0]]
+        width = float(P.norm(edge))
+        down = np.abs(edge[0] * (flat - one)[:, 1] - edge[1] * (flat - one)[:, 0]) / max(width, 1e-9)
+        return width, float(down.max())
+
     def aim(self, numbers: Array, points: Array, above: float) -> Array:
         """(n, 3) [m] places `above` points `numbers` (n,), of points (n, V, 3), for a hand that is to hold just these.
 

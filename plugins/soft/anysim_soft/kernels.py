@@ -1,4 +1,4 @@
-"""What is worked out around each step of the solver, compiled: an account of momentum, and the rows of contacts."""
+"""Account of momentum in a step of the solver, and rows of its contacts: what is worked out around it, compiled."""
 
 import math
 from typing import NamedTuple

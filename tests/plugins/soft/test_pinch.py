@@ -64,7 +64,7 @@ def test_a_pinch_holds_with_its_force_feels_the_weight_and_loses_no_momentum(eng
 
 
 def test_friction_decides_what_slips_out():
-    """Of a coefficient of 1 on both sides: half the weight is the least force; half of that lets it fall, half as much more holds."""
+    """With a coefficient of 1 half the weight is the least force; half of that lets it fall, more of it holds."""
     fallen = {}
     for share in (0.5, 1.5):
         with begun(strip(force=share * 0.12 * 0.24 * 8.0 * 9.81 / 2)) as (env, it):

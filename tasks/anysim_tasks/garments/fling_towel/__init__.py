@@ -1,0 +1,1 @@
+"""Fling a crumpled towel out with two arms."""
