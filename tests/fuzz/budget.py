@@ -49,14 +49,18 @@ def within(seconds: float = SECONDS, size: int = BYTES) -> Iterator[None]:
     faulthandler.dump_traceback_later(_STUCK * seconds, exit=True, file=sys.__stderr__)
     resource.setrlimit(resource.RLIMIT_AS, (_status("VmSize") + _GUARD * size, limits[1]))
     signal.setitimer(signal.ITIMER_REAL, seconds)
+    given = True
     try:
         yield
+    except MemoryError:
+        given = False  # what was refused was not taken, however much the system has moved meanwhile
+        raise
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, handler)
         resource.setrlimit(resource.RLIMIT_AS, limits)
         faulthandler.cancel_dump_traceback_later()
-        _spent(time.monotonic() - began, seconds, _status("VmHWM") - before, size)
+        _spent(time.monotonic() - began, seconds, (_status("VmHWM") - before) * given, size)
 
 
 def _spent(took: float, seconds: float, grown: int, size: int) -> None:
