@@ -4,6 +4,7 @@ import gc
 import multiprocessing
 import os
 import threading
+import time
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,12 +22,19 @@ ROOT = Path(__file__).parents[1]
 OWN_LEFTOVERS = frozenset({".pytest_cache", ".hypothesis", ".cache", ".ruff_cache", "__pycache__"})
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--minutes`, for runs that have to end, whatever the machine."""
+    words = "skip the tests that have not begun after so many minutes"
+    parser.addoption("--minutes", type=float, default=float("inf"), help=words)
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Register the markers, and keep assets that tests prepare away from the user's cache.
 
     The cache is shared by all tests and kept between runs: its entries are named by the hash of their content. It is an
     environment variable so that processes that a test starts use it too.
     """
+    config.stash[_BEGUN] = time.monotonic()
     config.addinivalue_line("markers", "slow: takes many seconds; `make test` leaves it out, `make test-slow` runs it")
     config.addinivalue_line("markers", "full: takes minutes and rarely finds more; only `make test-full` runs it")
     os.environ["ANYSIM_CACHE_DIR"] = str(ROOT / ".cache" / "tests")
@@ -91,6 +99,14 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
     return (yield)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what comes too late."""
+    minutes = item.config.getoption("--minutes")
+    if time.monotonic() - item.config.stash[_BEGUN] > 60.0 * minutes:
+        pytest.skip(f"the {minutes:g} minutes that were given are over")
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, None, None]:
     """A test that leaves a file in the working directory fails: libraries drop logs there when something is wrong."""
@@ -100,6 +116,7 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, None, None]:
         pytest.fail(f"the test left {', '.join(left)} in {Path.cwd()}; write to tmp_path", pytrace=False)
 
 
+_BEGUN = pytest.StashKey[float]()
 _BEFORE = pytest.StashKey[frozenset[str]]()
 _COLLECTED = pytest.StashKey[set[tuple[str, str, frozenset[str]]]]()
 
