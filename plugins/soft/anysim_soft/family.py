@@ -202,8 +202,9 @@ class Soft(CoSolver):
         twist = bodies.twist.copy()
         twist[..., :3] -= P.cross(twist[..., 3:], bodies.com - pose[:, met, :3])
         impulse = np.zeros((len(env_ids), len(met), 6))
-        joint_pos = self.engine.get_state().joint_pos[env_ids]
+        joint_pos = np.zeros((len(env_ids), 0))
         if len(self.pads):
+            joint_pos = self.engine.get_state().joint_pos[env_ids]
             self.pads.look(env_ids, self.x[env_ids], pose, joint_pos)
 
         def one(row: int) -> None:
@@ -215,16 +216,18 @@ class Soft(CoSolver):
             sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
             if len(self.pads):
                 sub.hold(*self.pads.held(env))
+            if self.pads.pinch:
                 shut, openings = self.pads.shut(joint_pos[row]), self.pads.openings(joint_pos[row])
                 sub.jaws.drive(sub.data, openings, shut, bodies.friction[row], duration)
             done = sub.step(self.soft.substeps, self.parameter("drag", env), env)
             if len(self.pads):
                 self.pads.felt(env, sub.pulls())
-                self.pads.pinched(env, sub.points(), sub.faces, shut, sub.jaws.pressed(sub.data))
             self.after_solve(env, sub)
             self.received[env] += done.received
             self.state_row[env], self.moved[env] = sub.state(), sub.momentum()
             points = sub.points()
+            if self.pads.pinch:
+                self.pads.pinched(env, points, sub.faces, self.pads.shut(joint_pos[row]), sub.jaws.pressed(sub.data))
             self.v[env], self.x[env] = (points - self.x[env]) / duration, points
             due = self.pending[env] + done.impulse
             impulse[row] = np.where(self._late[:, None], SHARE * due, due)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from anysim.conventions import Array, wxyz_from_xyzw
+from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.errors import PluginError, listing
 from anysim.math import pose as P
 from anysim.model.frames import FixedFrame
@@ -200,7 +200,7 @@ class Jaws:
                 along = data.contact.frame[rows].reshape(-1, 3, 3) @ data.xaxis[joint]
                 force[end] = (away[:, None] * pushes * along).sum()
                 touching.append(rows[pushes[:, 0] > 0])
-            pose = np.concatenate([data.xpos[hand], data.xquat[hand][[1, 2, 3, 0]]])
+            pose = np.concatenate([data.xpos[hand], xyzw_from_wxyz(data.xquat[hand])])
             resting = bool(np.abs(data.qvel[self._dofs[number]]).max() < RESTING)
             rows = np.concatenate(touching)
             faces, places = data.contact.elem[rows].max(axis=1), data.contact.pos[rows].copy()

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from anysim.conventions import WORLD, Array, wxyz_from_xyzw
+from anysim.conventions import WORLD, Array, wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.families.cosolver import about_origin
 from anysim.math import pose as P
 from anysim.model.world import World
@@ -209,7 +209,7 @@ class SubWorld:
         """Put nodes that all move to `factor` times their distance from their middle, from the beginning."""
         places = self.node_places()
         rows = self.model.jnt_qposadr[self.model.body_jntadr[self._moving]][:, None] + np.arange(3)
-        local = P.rotate_inverse(self.data.xquat[self._moving][:, [1, 2, 3, 0]], places - places.mean(axis=0))
+        local = P.rotate_inverse(xyzw_from_wxyz(self.data.xquat[self._moving]), places - places.mean(axis=0))
         self.data.qpos[rows] = (factor - 1.0) * local
         self.place()
 
