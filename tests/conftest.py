@@ -102,7 +102,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what comes too late."""
-    minutes = item.config.getoption("--minutes")
+    minutes = float(item.config.option.minutes)
     if time.monotonic() - item.config.stash[_BEGUN] > 60.0 * minutes:
         pytest.skip(f"the {minutes:g} minutes that were given are over")
 
