@@ -129,8 +129,9 @@ class SimEngine(EngineSensing):
             self._require(Capability.WRENCHES)
             ids, which = self._ids(env_ids), self._which(bodies, len(self.world.bodies), "body")
             forces = arguments.rows("wrench", wrench, (len(ids), len(which), 6))
-            there = self._presence.bodies[ids[:, None], which]
-            self._commands.add_wrench(np.where(there[..., None], forces, 0.0), ids, which, once=once)
+            if self._presence.varies:
+                forces = np.where(self._presence.bodies[ids[:, None], which, None], forces, 0.0)
+            self._commands.add_wrench(forces, ids, which, once=once)
 
     # ------------------------------------------------------------------ parameters
 

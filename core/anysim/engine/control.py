@@ -109,7 +109,7 @@ class CommandBuffer:
         held = self.once if once else self.wrench
         if held is None:
             held = np.zeros((len(self.control.position), self._bodies, 6))
-        held[np.ix_(ids, bodies)] += wrench
+        held[ids[:, None], bodies] += wrench
         self.wrench, self.once = (self.wrench, held) if once else (held, self.once)
 
     @property

@@ -6,6 +6,8 @@ What the matter gains is accounted for: see `balance`.
 """
 
 from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -18,28 +20,56 @@ from anysim.math import pose as P
 from anysim.model.world import BodyKind
 
 
-class MetBodies(NamedTuple):
-    """K bodies in n envs at the beginning of a physics step, world axes; those that are not there have no mass.
+@dataclass
+class MetBodies:
+    """K bodies in n envs at the beginning of a physics step, world axes; what follows from the rest is made if asked.
 
     Attributes:
-        com: (n, K, 3) [m] their centres of mass.
-        twist: (n, K, 6) [m/s, rad/s] velocity of the centre of mass, and rate.
-        mass: (n, K) [kg]; inf of what joints hold, which a co-solver takes to move as it does, whatever it meets.
+        frame: (n, K, 7) of the bodies.
+        frame_twist: (n, K, 6) [m/s, rad/s] velocity of the frame's origin, and rate.
+        local: (n, K, 3) [m] their centres of mass in these frames.
+        weighed: (n, K) [kg] as if all were there; inf of what joints hold.
         moments: (n, K, 6) [kg m^2] xx, yy, zz, xy, xz, yz about the centre of mass, in the axes of the body.
-        turn: (n, K, 4) of these axes.
         friction: (n, G) of the World's geoms.
         there: (n, E) bool, the World's entities that are there.
+        entity: (K,) of which they are.
         body_pose: (n, B, 7) of all bodies.
     """
 
-    com: Array
-    twist: Array
-    mass: Array
+    frame: Array
+    frame_twist: Array
+    local: Array
+    weighed: Array
     moments: Array
-    turn: Array
     friction: Array
     there: Array
+    entity: Array
     body_pose: Array
+
+    @cached_property
+    def _arm(self) -> Array:
+        return P.rotate(self.turn, self.local)
+
+    @property
+    def turn(self) -> Array:
+        """(n, K, 4) of the axes of bodies."""
+        return self.frame[..., 3:]
+
+    @cached_property
+    def com(self) -> Array:
+        """(n, K, 3) [m] their centres of mass."""
+        return self.frame[..., :3] + self._arm
+
+    @cached_property
+    def twist(self) -> Array:
+        """(n, K, 6) [m/s, rad/s] velocity of the centre of mass, and rate."""
+        moving, rate = self.frame_twist[..., :3], self.frame_twist[..., 3:]
+        return np.concatenate([moving + P.cross(rate, self._arm), rate], axis=-1)
+
+    @cached_property
+    def mass(self) -> Array:
+        """(n, K) [kg], 0 of what is not there; inf of what joints hold, which moves as it does, whatever it meets."""
+        return np.where(self.there[:, self.entity], self.weighed, 0.0)
 
     @property
     def inertia(self) -> Array:
@@ -92,6 +122,8 @@ class CoSolver(Family):
         self._friction = self.remember("geom_friction", len(world.geoms))
         self.given, self.received = self.remember("given", k, 6), self.remember("received", 6)
         self._impulse, self._begun = self.remember("impulse", k, 6), self.remember("begun", 6)
+        self._everyone = np.arange(self.engine.num_envs)
+        self._all_there = None if world.slots else self.engine.presence
 
     def meets(self, body: int) -> bool:
         """Whether it exchanges impulses with a body that collides: with all that can move, and are not its own."""
@@ -133,24 +165,26 @@ class CoSolver(Family):
         return built if which is None else built[which]
 
     def before_step(self, env_ids: Array, duration: float) -> None:
-        bodies = self._bodies(env_ids)
-        impulse = self.solve(env_ids, bodies, duration)
-        self._impulse[env_ids] = impulse
-        self.given[env_ids] += impulse
-        self.given[env_ids, :, 3:] += P.cross(bodies.com, impulse[..., :3])
-        if len(self.met):
-            self.push(env_ids, impulse / duration, self.met)
-
-    def _bodies(self, env_ids: Array) -> MetBodies:
+        rows = slice(None) if np.array_equal(env_ids, self._everyone) else env_ids  # views of all cost nothing
         state, met = self.engine.get_state(), self.met
-        pose, twist = state.body_pose[env_ids], state.body_twist[env_ids][:, met]
-        own, there = pose[:, met], self.engine.presence[env_ids]
-        arm = P.rotate(own[..., 3:], self._com[env_ids])
-        twist = np.concatenate([twist[..., :3] + P.cross(twist[..., 3:], arm), twist[..., 3:]], axis=-1)
-        mass = np.where(self._held, np.inf, self._mass[env_ids])
-        mass = np.where(there[:, self._entity], mass, 0.0)
-        com, moments, turn = own[..., :3] + arm, self._inertia[env_ids], own[..., 3:]
-        return MetBodies(com, twist, mass, moments, turn, self._friction[env_ids], there, pose)
+        pose, twist, there = state.body_pose[rows], state.body_twist[rows], self._all_there
+        bodies = MetBodies(
+            pose[:, met],
+            twist[:, met],
+            self._com[rows],
+            np.where(self._held, np.inf, self._mass[rows]),
+            self._inertia[rows],
+            self._friction[rows],
+            self.engine.presence[rows] if there is None else there[rows],
+            self._entity,
+            pose,
+        )
+        impulse = self.solve(env_ids, bodies, duration)
+        self._impulse[rows] = impulse
+        self.given[rows] += impulse
+        self.given[rows, :, 3:] += P.cross(bodies.com, impulse[..., :3])
+        if len(met):
+            self.push(env_ids, impulse / duration, met)
 
     # ------------------------------------------------------------------ what others ask of it
 

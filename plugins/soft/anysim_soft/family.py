@@ -197,11 +197,9 @@ class Soft(CoSolver):
         return made[1]
 
     def solve(self, env_ids: Array, bodies: MetBodies, duration: float) -> Array:
-        met, still = self.met, self.scenery.still
+        still = self.scenery.still
         pose, there = bodies.body_pose, bodies.there[:, self._entities]
-        twist = bodies.twist.copy()
-        twist[..., :3] -= P.cross(twist[..., 3:], bodies.com - pose[:, met, :3])
-        impulse = np.zeros((len(env_ids), len(met), 6))
+        impulse = np.zeros((len(env_ids), len(self.met), 6))
         joint_pos = np.zeros((len(env_ids), 0))
         if len(self.pads):
             joint_pos = self.engine.get_state().joint_pos[env_ids]
@@ -213,7 +211,8 @@ class Soft(CoSolver):
                 return
             sub = self.sub_world(env)
             sub.take(self.state_row[env])
-            sub.meet(pose[row, met], twist[row], pose[row, still], there[row], bodies.friction[row])
+            frames = bodies.frame[row], bodies.frame_twist[row], pose[row, still]
+            sub.meet(*frames, there[row], bodies.friction[row])
             if len(self.pads):
                 sub.hold(*self.pads.held(env))
             if self.pads.pinch:
@@ -224,11 +223,14 @@ class Soft(CoSolver):
                 self.pads.felt(env, sub.pulls())
             self.after_solve(env, sub)
             self.received[env] += done.received
-            self.state_row[env], self.moved[env] = sub.state(), sub.momentum()
+            sub.save(self.state_row[env])
+            self.moved[env] = sub.momentum()
             points = sub.points()
             if self.pads.pinch:
                 self.pads.pinched(env, points, sub.faces, self.pads.shut(joint_pos[row]), sub.jaws.pressed(sub.data))
-            self.v[env], self.x[env] = (points - self.x[env]) / duration, points
+            np.subtract(points, self.x[env], out=self.v[env])
+            self.v[env] /= duration
+            self.x[env] = points
             due = self.pending[env] + done.impulse
             impulse[row] = np.where(self._late[:, None], SHARE * due, due)
             self.pending[env] = due - impulse[row]

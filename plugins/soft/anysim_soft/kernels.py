@@ -1,7 +1,9 @@
-"""Account of momentum in a step of the solver, and rows of its contacts: what is worked out around it, compiled."""
+"""What is worked out around the solver, compiled: where proxies are, forces of its own, momentum, rows of contacts."""
 
 import math
 from typing import NamedTuple
+
+import numpy as np
 
 from anysim.conventions import Array
 from anysim_particles.kernels.compiling import compiled
@@ -17,6 +19,66 @@ class Exchange(NamedTuple):
 
     impulse: Array
     received: Array
+
+
+def _meet(
+    pose: Array, twist: Array, there: Array, away: float, places: Array, rates: Array, position: Array, velocity: Array
+) -> None:
+    """Put proxies where their bodies are.
+
+    Args:
+        pose, twist: (K, 7) and (K, 6) of the bodies' frames.
+        there: (K + ...,) bool; what is not there goes to the height `away` [m].
+        places, rates: (K, 7) and (K, 6) the coordinates and degrees of freedom of the proxies.
+        position, velocity: of all coordinates, and of all degrees of freedom, written.
+    """
+    for k in range(pose.shape[0]):
+        x, y, z, w = pose[k, 3], pose[k, 4], pose[k, 5], pose[k, 6]
+        a, b, c = twist[k, 3], twist[k, 4], twist[k, 5]
+        # turned by the inverse: v + 2 (w (v x u) + u x (u x v)), u the vector of the quaternion
+        p, q, r = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+        spin = (a + w * p + (q * z - r * y), b + w * q + (r * x - p * z), c + w * r + (p * y - q * x))
+        for axis in range(3):
+            position[places[k, axis]] = pose[k, axis]
+            velocity[rates[k, axis]] = twist[k, axis]
+        for axis, value in enumerate(spin):
+            velocity[rates[k, 3 + axis]] = value
+        for axis, value in enumerate((w, x, y, z)):
+            position[places[k, 3 + axis]] = value
+        if not there[k]:
+            position[places[k, 2]] = away
+
+
+def _load(
+    velocity: Array, mass: Array, dofs: Array, gravity: Array, slower: float, inner: Array, applied: Array, outer: Array
+) -> None:
+    """Write the forces (M, 3) [N] on points: `applied` from air and each other, `outer` from weight and air.
+
+    Args:
+        velocity: (nv,) of all degrees of freedom.
+        mass, dofs: (M,) [kg] and (M, 3) of the points that move.
+        gravity: (3,) [m/s^2].
+        slower: [1/s] air.
+        inner: (M, 3) [N] what they do to each other.
+        applied: (nv,) written at the degrees of freedom.
+        outer: (M, 3) written.
+    """
+    for m in range(mass.shape[0]):
+        for axis in range(3):
+            air = -slower * mass[m] * velocity[dofs[m, axis]]
+            applied[dofs[m, axis]] = air + inner[m, axis]
+            outer[m, axis] = mass[m] * gravity[axis] + air
+
+
+def _momentum(mass: Array, velocity: Array, dofs: Array, points: Array, at: Array) -> Array:
+    """(6,) [N s, N m s] about the world's origin; the arguments are those of `load` and `account`."""
+    total = np.zeros(6)
+    for m in range(mass.shape[0]):
+        px, py, pz = (mass[m] * velocity[dofs[m, 0]], mass[m] * velocity[dofs[m, 1]], mass[m] * velocity[dofs[m, 2]])
+        x, y, z = at[points[m], 0], at[points[m], 1], at[points[m], 2]
+        for axis, value in enumerate((px, py, pz, y * pz - z * py, z * px - x * pz, x * py - y * px)):
+            total[axis] += value
+    return total
 
 
 def _account(
@@ -74,20 +136,25 @@ def _account(
             total[axis] += value
 
 
-def _even_rows(rows: Array, counts: Array, begins: Array, columns: Array, entries: Array, axis: Array) -> None:
-    """Scale rows of a Jacobian so that the flex is pushed as much as what touches it.
+def _even_rows(
+    kinds: Array, kind: int, counts: Array, begins: Array, columns: Array, entries: Array, axis: Array
+) -> bool:
+    """Scale rows of a Jacobian so that the flex is pushed as much as what touches it; returns whether there are any.
 
     Args:
-        rows: (R,) the rows.
-        counts, begins: (all rows,) how many entries they have, and where the first is; empty where all are written.
+        kinds, kind: (R,) of all rows, and that of those that are scaled.
+        counts, begins: (R,) how many entries they have, and where the first is; empty where all are written.
         columns: (entries,) of each entry; empty where all are written.
         entries: the Jacobian, flat.
         axis: (nv,) along which a degree of freedom of the flex moves a point, -1 of others.
     """
     width = axis.shape[0]
     sparse = counts.shape[0] > 0
-    for place in range(rows.shape[0]):
-        row = rows[place]
+    found = False
+    for row in range(kinds.shape[0]):
+        if kinds[row] != kind:
+            continue
+        found = True
         first = begins[row] if sparse else row * width
         count = counts[row] if sparse else width
         x = y = z = 0.0
@@ -104,6 +171,8 @@ def _even_rows(rows: Array, counts: Array, begins: Array, columns: Array, entrie
             for entry in range(first, first + count):
                 if axis[columns[entry] if sparse else entry - first] >= 0:
                     entries[entry] /= size
+    return found
 
 
 account, even_rows = compiled(_account), compiled(_even_rows)
+load, meet, momentum = compiled(_load), compiled(_meet), compiled(_momentum)

@@ -4,6 +4,7 @@ Proxies and what is fixed collide with the flex alone. A proxy has the true mass
 what the engine says. One of a body that joints hold is so heavy that it moves as it does.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -13,11 +14,11 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw, xyzw_from_wxyz
-from anysim.families.cosolver import about_origin
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_mujoco.geoms import add_assets, add_geom
-from anysim_soft.kernels import Exchange, account, even_rows
+from anysim_soft import kernels
+from anysim_soft.kernels import Exchange
 from anysim_soft.pinch import Jaw, Jaws, add_jaw
 
 HEAVY = 1e4
@@ -122,7 +123,14 @@ class Scenery(NamedTuple):
 
 
 class SubWorld:
-    """The model of one env; all that changes is in the state that is passed in and comes out."""
+    """The model of one env; all that changes is in the state that is passed in and comes out.
+
+    Attributes:
+        nodes: (V,) MuJoCo's bodies.
+        mass: (M,) [kg] of those that move.
+        faces: (F, 3) of its surface.
+        state_size: numbers of a state.
+    """
 
     def __init__(
         self,
@@ -145,8 +153,9 @@ class SubWorld:
         self.mass = np.array(model.body_mass[self._moving])
         self._axis = np.full(model.nv, -1)
         self._axis[self._dofs] = np.arange(3)
-        self._uneven = bool(model.flex_interp[0])
+        self._uneven, self._sparse = bool(model.flex_interp[0]), bool(mujoco.mj_isSparse(model))
         self._pinned = len(self._moving) < len(self.nodes)
+        self._outer, self._no_inner = np.zeros((2, len(self._moving), 3))
         k, s = len(scenery.met), len(scenery.still)
         free = [model.body(f"met {i}").jntadr[0] for i in range(k)]
         self._pose = model.jnt_qposadr[free].reshape(k, 1) + np.arange(7)
@@ -158,11 +167,7 @@ class SubWorld:
         self._slots = connects[len(connects) - len(slots.places) :]
         self.jaws = Jaws(model, slots.jaws, float(model.flex_friction[0, 0]))
         self.faces = _faces(model)
-
-    @property
-    def state_size(self) -> int:
-        """Numbers of a state."""
-        return int(mujoco.mj_stateSize(self.model, STATE))
+        self.state_size = int(mujoco.mj_stateSize(model, STATE))
 
     def beginning(self, openings: Array | None = None) -> Array:
         """The state in which nothing has moved yet, the pads of J jaws (J, 2) [m] from their middle."""
@@ -179,8 +184,12 @@ class SubWorld:
     def state(self) -> Array:
         """The state as it is now."""
         state = np.empty(self.state_size)
-        mujoco.mj_getState(self.model, self.data, state, STATE)
+        self.save(state)
         return state
+
+    def save(self, state: Array) -> None:
+        """Write the state as it is now into an array."""
+        mujoco.mj_getState(self.model, self.data, state, STATE)
 
     def take(self, state: Array) -> None:
         """Take up a state; `place` works out where everything is."""
@@ -215,22 +224,18 @@ class SubWorld:
 
     def momentum(self) -> Array:
         """(6,) of the flex, about the world's origin."""
-        p = self.mass[:, None] * self.data.qvel[self._dofs]
-        return about_origin(p, self.data.xpos[self._moving])
+        return kernels.momentum(self.mass, self.data.qvel, self._dofs, self._moving, self.data.xpos)
 
     def meet(self, pose: Array, twist: Array, still: Array, there: Array, friction: Array) -> None:
         """Put the proxies to poses (K, 7) and twists (K, 6) of their frames, and what stands still to poses (S, 7).
 
         `there` (K + S,) bool; `friction` (G,) of the World's geoms.
         """
-        data, k = self.data, len(pose)
-        turn = wxyz_from_xyzw(pose[:, 3:])
-        data.qpos[self._pose] = np.concatenate([pose[:, :3], turn], axis=1)
-        data.qpos[self._pose[~there[:k], 2]] = AWAY
-        spin = P.rotate_inverse(pose[:, 3:], twist[:, 3:])
-        data.qvel[self._twist] = np.concatenate([twist[:, :3], spin], axis=1)
-        data.mocap_pos[self._mocap], data.mocap_quat[self._mocap] = still[:, :3], wxyz_from_xyzw(still[:, 3:])
-        data.mocap_pos[self._mocap[~there[k:]], 2] = AWAY
+        data = self.data
+        kernels.meet(pose, twist, there, AWAY, self._pose, self._twist, data.qpos, data.qvel)
+        if len(still):
+            data.mocap_pos[self._mocap], data.mocap_quat[self._mocap] = still[:, :3], wxyz_from_xyzw(still[:, 3:])
+            data.mocap_pos[self._mocap[~there[len(pose) :]], 2] = AWAY
         self.model.geom_friction[self._geoms, 0] = friction[self.scenery.geoms]
 
     def hold(self, nodes: Array, anchors: Array, holding: Array) -> None:
@@ -253,18 +258,22 @@ class SubWorld:
         """Move on by `substeps` steps from a state that was taken up; `env` is what its inner forces are told."""
         model, data, h = self.model, self.data, self.model.opt.timestep
         done = Exchange(np.zeros((len(self._pose), 6)), np.zeros(6))
-        slower, weight = (1.0 - np.exp(-drag * h)) / h, self.mass[:, None] * self.gravity
+        slower, inner, outer = (1.0 - math.exp(-drag * h)) / h, self._no_inner, self._outer
+        points, bodies, frames = (
+            (self._moving, self._dofs),
+            (self._proxies, self._twist),
+            (data.xpos, data.xipos, data.xmat),
+        )
         for _ in range(substeps):
             mujoco.mj_step1(model, data)  # works out where everything is
             before = self.momentum() if self._pinned else None
-            air = -slower * self.mass[:, None] * data.qvel[self._dofs]
-            data.qfrc_applied[self._dofs] = air if self.source.inner is None else air + self._inner(env)
+            if self.source.inner is not None:
+                inner = self._inner(env)
+            kernels.load(data.qvel, self.mass, self._dofs, self.gravity, slower, inner, data.qfrc_applied, outer)
             if self._uneven:
                 self._even_contacts()
             mujoco.mj_step2(model, data)
-            bodies, points = (self._proxies, self._twist), (self._moving, self._dofs)
-            frames = data.xpos, data.xipos, data.xmat
-            account(data.qfrc_constraint, *frames, *bodies, *points, weight + air, h, self._pinned, done)
+            kernels.account(data.qfrc_constraint, *frames, *bodies, *points, outer, h, self._pinned, done)
             if before is not None:  # what holds it has no force of its own in MuJoCo: it gives what is missing
                 mujoco.mj_kinematics(model, data)
                 done.received[:] += self.momentum() - before
@@ -285,13 +294,10 @@ class SubWorld:
         Quadratic elements weigh some nodes negatively, and MuJoCo leaves these out of its Jacobian: what is left
         sums up to more than one, and 15 to 20 % of the momentum would come from nowhere. Here it is scaled to one.
         """
-        model, data = self.model, self.data
-        rows = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC))
-        if not len(rows):
-            return
-        sparse = data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
-        even_rows(rows, *(sparse if mujoco.mj_isSparse(model) else _DENSE), data.efc_J.reshape(-1), self._axis)
-        mujoco.mj_referenceConstraint(model, data)
+        data, kind = self.data, int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)
+        sparse = (data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind) if self._sparse else _DENSE
+        if kernels.even_rows(data.efc_type, kind, *sparse, data.efc_J.reshape(-1), self._axis):
+            mujoco.mj_referenceConstraint(self.model, data)
 
 
 def _faces(model: Any) -> Array:
