@@ -63,7 +63,7 @@ def rooms() -> str:
         people = " and ".join(str(n) for n in sorted({one["people"] for one in among}))
         parts += [
             f"With {people} people who walk through the room at 0.2 to 0.5 m/s and yield to nothing; *met* counts "
-            "drives on which one touched the base, by what the base did then:",
+            "drives on which one touched the base, which stood, was moving away or aside, or moved towards them:",
             table([*head, "met"], [line(one) for one in among]),
         ]
     return "\n\n".join(parts)

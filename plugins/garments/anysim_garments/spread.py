@@ -58,7 +58,8 @@ class ClothSpread(SkillSequence):
             "release": Release(env, **arm),
             "judge": _Flatness(env, hand, it, share),
         }
-        failures = (("grasp", Outcome.MISSED_CONTACT), ("carry", Outcome.UNSTABLE_GRASP), ("carry", Outcome.TIMEOUT))
+        lost = (("grasp", Outcome.NO_IK), ("grasp", Outcome.MISSED_CONTACT))
+        failures = (*lost, ("carry", Outcome.UNSTABLE_GRASP), ("carry", Outcome.TIMEOUT))
         again = dict.fromkeys([*failures, ("judge", Outcome.ADVERSE_STATE)], "choose")
         super().__init__(env, members, back=again, max_attempts=rounds)
 

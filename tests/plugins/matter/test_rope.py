@@ -5,8 +5,10 @@ import pytest
 
 import anysim
 from anysim.errors import TaskError
+from anysim.skills.base import OUTCOMES, Outcome
 from anysim.task.scene import Frame
 from anysim_matter.cord import Cord
+from anysim_matter.rope_grasp import RopeGrasp
 from anysim_matter.terms import Around, PointAt
 from tests.tasks.matter_paths import put_cable
 from tests.tasks.states import blind
@@ -46,3 +48,16 @@ def test_other_matter_is_no_rope() -> None:
             Cord(env.scene, env.scene.category("sand"))
         with pytest.raises(TaskError, match="'bowl' is no family of matter"):
             Cord(env.scene, env.scene.category("bowl"))
+
+
+def test_a_rope_that_the_arm_does_not_reach_is_no_ik_at_once() -> None:
+    with blind("route_cable", "mujoco", 1) as env:
+        env.reset(seed=2)
+        cable, everyone = env.scene.category("cable"), np.array([0])
+        put_cable(env, np.linspace([[2.0, 0.0, 0.02]], [[2.5, 0.0, 0.02]], 31, axis=1))
+        env.scene.look(None)
+        grasp = RopeGrasp(env, robot=env.scene.robot("panda"), rope=cable)
+        grasp.begin(everyone)
+        for _ in range(4):  # it is asked again before it gives up
+            grasp.act(everyone, np.zeros((1, env.action_dim)))
+        assert OUTCOMES[grasp.outcome[0]] is Outcome.NO_IK
