@@ -1,4 +1,4 @@
-"""What is worked out around the solver, compiled: where proxies are, forces of its own, momentum, rows of contacts."""
+"""Account of momentum in a step of the solver, places of proxies, forces on points, rows of contacts: all compiled."""
 
 import math
 from typing import NamedTuple
