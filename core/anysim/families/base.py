@@ -7,7 +7,7 @@ arrays with one row per env: snapshots, partial resets and replays follow from t
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import ClassVar, Literal, NamedTuple
 
@@ -89,6 +89,9 @@ class Family(ABC):
         self.memory: dict[str, Array] = {}
         self.bounds: dict[str, tuple[float, float]] = {}
         self._driven = np.zeros(0, dtype=np.intp)
+
+    def joined(self, families: Sequence["Family"]) -> None:
+        """All families of the World are made, itself among them, in the order of the file."""
 
     # ------------------------------------------------------------------ the World
 

@@ -59,6 +59,9 @@ class FamilyManager(Manager):
                 self._families[name] = kind(
                     FamilySetting(name, values, engine, self.streams, own, self.episodes.origin)
                 )
+        for name, family in self._families.items():
+            with self._blames[name]:
+                family.joined([*self._families.values()])
         self._by_step = [name for name, family in self._families.items() if family.rate == "physics"]
         self._by_part = [name for name in self._families if name not in self._by_step]
         self._dt = engine.world.physics.dt

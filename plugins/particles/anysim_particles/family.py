@@ -12,7 +12,7 @@ from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
 from anysim.errors import SpecError, SpecIssue
-from anysim.families.base import FamilyPart, FamilySetting, FamilyState
+from anysim.families.base import Family, FamilyPart, FamilySetting, FamilyState
 from anysim.families.cosolver import CoSolver, MetBodies, about_origin
 from anysim.math import pose as P
 from anysim.model.world import Body, BodyKind
@@ -94,7 +94,12 @@ class Particles(CoSolver):
         floats = [not world.bodies[i].gravity_compensation and bool(world.loose[i]) for i in self.met]
         self._falls = np.array([*floats, False], dtype=bool)
         self._gravity = np.array(world.physics.gravity, dtype=float)
+        self._skinned: Sequence[skins.Skinned] = ()
         self._threads = max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
+
+    def joined(self, families: Sequence[Family]) -> None:
+        if self.meets_skins:
+            self._skinned = [one for one in families if isinstance(one, skins.Skinned)]
 
     def drawn_value(self, key: str, env_ids: Array) -> Array:
         """A parameter as it is in the episodes of these envs."""
@@ -138,7 +143,7 @@ class Particles(CoSolver):
         from anysim_particles.kernels.contacts import Proxies
 
         n = len(env_ids)
-        others = skins.offered(self.engine) if self.meets_skins else ()
+        others = self._skinned
         tables = [skins.table([other.skin(env) for other in others]) for env in env_ids.tolist()]
         met, size = len(self.met), len(self.met) + (len(tables[0].points) if tables else 0)
         posed = self.scene.posed(bodies.body_pose, bodies.there)
@@ -205,7 +210,7 @@ class Particles(CoSolver):
             self.received[env] -= about_origin(got, points)
             begun = 0
             for other, count in zip(others, tables[row].counts, strict=True):
-                other.splash(env, got[begun : begun + count])
+                other.touch(env, got[begun : begun + count])
                 begun += count
 
     def momentum(self, env_ids: Array) -> Array:

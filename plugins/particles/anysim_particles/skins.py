@@ -1,18 +1,15 @@
 """Skins: closed surfaces of other matter that liquids meet, and what they trade with it.
 
-A family of matter with a skin registers itself (`offer`) for its engine. A liquid takes the points of skins as bodies
-without a size, whose masses they have, while it moves on; what they get is told to the family (`Skinned.splash`), which
-acts on it in its own next step.
+A liquid takes the points of skins as bodies without a size, whose masses they have, while it moves on; what they get is
+told to the family (`Skinned.touch`), which acts on it in its own next step.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
-from weakref import WeakKeyDictionary
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.base import SimEngine
 
 
 class Skin(NamedTuple):
@@ -33,6 +30,7 @@ class Skin(NamedTuple):
     radius: float
 
 
+@runtime_checkable
 class Skinned(Protocol):
     """A family whose matter has a skin."""
 
@@ -40,7 +38,7 @@ class Skinned(Protocol):
         """What it is like in an env now."""
         ...
 
-    def splash(self, env: int, impulse: Array) -> None:
+    def touch(self, env: int, impulse: Array) -> None:
         """Its points get impulses (V, 3) [N s], before its solver moves on the next time."""
         ...
 
@@ -65,21 +63,10 @@ class SkinTable(NamedTuple):
     counts: tuple[int, ...]
 
 
-_OFFERED: "WeakKeyDictionary[SimEngine, list[Skinned]]" = WeakKeyDictionary()
 NOTHING = SkinTable(
     np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3), np.int32), np.zeros(1, np.int32), np.zeros(0), ()
 )
 """No skins."""
-
-
-def offer(engine: SimEngine, family: Skinned) -> None:
-    """Let liquids beside this engine meet the skin of a family."""
-    _OFFERED.setdefault(engine, []).append(family)
-
-
-def offered(engine: SimEngine) -> Sequence[Skinned]:
-    """The families whose skins liquids meet, in the order in which they were made."""
-    return _OFFERED.get(engine, ())
 
 
 def table(skins: Sequence[Skin]) -> SkinTable:

@@ -15,8 +15,9 @@ from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.errors import PluginError
 from anysim.families.base import FamilySetting
 from anysim.math import pose as P
-from anysim_soft.deformable import OPTIONS, contact_of, numbers, on_side
+from anysim_soft.deformable import OPTIONS, on_side
 from anysim_soft.family import Soft
+from anysim_soft.flex_xml import contact_of, numbers
 from anysim_soft.spec import FemClothSpec, SoftSpec
 from anysim_soft.subworld import FlexSource
 

@@ -6,26 +6,41 @@ import numpy as np
 
 from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.errors import SpecError, SpecIssue
+from anysim.families.base import FamilySetting
 from anysim.math import pose as P
-from anysim_soft.family import Soft
+from anysim_soft.flex_xml import contact_of, numbers
+from anysim_soft.shell_matter import ShellMatter
 from anysim_soft.spec import DeformableSpec, SoftSpec
 from anysim_soft.subworld import FlexSource
+from anysim_soft.surfaces import Surface
 
 SKIN = 0.001
 """[m] from the surface at which contacts act."""
 OPTIONS = {"integrator": "discrete", "solver": "Newton", "iterations": 2000, "tolerance": 1e-15, "cone": "elliptic"}
 """Elastic solids need the integrator that knows their stiffness. Where its iterations end too early, matter is damped
 less than it should be; a loose tolerance would lose momentum."""
-SOLIMP = "0.99 0.999 0.001"
 
 
-class Deformable(Soft):
+class Deformable(ShellMatter):
     """A block with Young's modulus, Poisson's ratio and density."""
 
     spec = DeformableSpec
     label = "soft block"
     tint = (0.85, 0.45, 0.35)
-    drawn_keys = (*Soft.drawn_keys, "density", "young", "poisson", "damping")
+    drawn_keys = (*ShellMatter.drawn_keys, "density", "young", "poisson", "damping")
+
+    def __init__(self, setting: FamilySetting) -> None:
+        super().__init__(setting)
+        assert isinstance(setting.spec, DeformableSpec)
+        counts = np.array(setting.spec.points)
+        rest, faces = _lattice(np.array(setting.spec.box), counts), self.faces
+        corner = rest[faces]
+        share = np.zeros(len(rest))
+        area = P.norm(P.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
+        np.add.at(share, faces, area[:, None])
+        own = share[self.shell] / share.sum()
+        self._surface = Surface(rest[self.shell], np.searchsorted(self.shell, faces), own, SKIN, 0.0)
+        self._shares = _shares(counts, np.array(setting.spec.cells))[self.shell].T
 
     @classmethod
     def count(cls, spec: SoftSpec) -> int:
@@ -60,7 +75,29 @@ class Deformable(Soft):
             f"{contact_of(values['friction'], self._step)}</flexcomp>"
         )
         sides = {side: on_side(nodes, box, side) for side in spec.attached}
-        return FlexSource(xml, fixed, np.zeros(0), OPTIONS, sides)
+
+        def press(env: int, x: Array, v: Array) -> Array:
+            del x, v
+            return self._shares @ self.pushed(env)
+
+        return FlexSource(xml, fixed, np.zeros(0), OPTIONS, sides, inner=press)
+
+    # ------------------------------------------------------------------ what lies on it
+
+    @property
+    def pinned(self) -> bool:
+        assert isinstance(self.soft, DeformableSpec)
+        return bool(self.soft.fixed)
+
+    def surface(self, env: int) -> Surface:
+        """What garments meet of it in the episode of an env: all of its mass is there."""
+        return self._surface._replace(
+            mass=self.mass(env) * self._surface.mass, friction=self.parameter("friction", env)
+        )
+
+    def moving(self, env: int) -> tuple[Array, Array]:
+        """(S, 3) [m], [m/s] the points of that surface now."""
+        return self.x[env, self.shell], self.v[env, self.shell]
 
     @property
     def radius(self) -> float:
@@ -73,23 +110,6 @@ class Deformable(Soft):
     def mass(self, env: int) -> float:
         assert isinstance(self.soft, DeformableSpec)
         return self.parameter("density", env) * float(np.prod(self.soft.box))
-
-
-def contact_of(friction: float, dt: float, *, itself: bool = False) -> str:
-    """How a flex touches: as it says, whatever it meets, but that the larger coefficient of friction acts.
-
-    With `itself`, also where parts of it come to lie on each other.
-    """
-    touches = 'selfcollide="auto" contype="1"' if itself else 'selfcollide="none" contype="0"'
-    return (
-        f'<contact {touches} conaffinity="1" solmix="1e6" friction="{friction!r}" '
-        f'solref="{2 * dt!r} 1" solimp="{SOLIMP}"/>'
-    )
-
-
-def numbers(values: Array) -> str:
-    """Numbers in XML, to the bit."""
-    return " ".join(repr(float(value)) for value in values)
 
 
 def on_side(points: Array, size: Array, side: str) -> Array:
@@ -106,3 +126,18 @@ def _lattice(box: Array, counts: Array) -> Array:
     """(V, 3) [m] about the middle, z fastest, as MuJoCo has the nodes of a grid."""
     axes = [np.linspace(-edge / 2, edge / 2, count) for edge, count in zip(box, counts, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _shares(points: Array, cells: Array) -> Array:
+    """(V, nodes) how much of each point of a lattice moves with each node of quadratic cells, z fastest in both."""
+    axes = []
+    for count, number in zip(points.tolist(), cells.tolist(), strict=True):
+        at = np.linspace(0.0, number, count)
+        cell = np.minimum(at.astype(int), number - 1)
+        along, found = at - cell, np.zeros((count, 2 * number + 1))
+        rows = np.arange(count)
+        found[rows, 2 * cell] = (2 * along - 1) * (along - 1)
+        found[rows, 2 * cell + 1] = 4 * along * (1 - along)
+        found[rows, 2 * cell + 2] = along * (2 * along - 1)
+        axes.append(found)
+    return np.kron(np.kron(axes[0], axes[1]), axes[2])

@@ -12,7 +12,7 @@ from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
 from anysim.errors import PluginError, SpecError, SpecIssue, listing
-from anysim.families.base import FamilyPart, FamilySetting, FamilyState
+from anysim.families.base import Family, FamilyPart, FamilySetting, FamilyState
 from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
 from anysim.model.world import Body, BodyKind
@@ -21,6 +21,7 @@ from anysim_schemas.base import Spec
 from anysim_soft.pads import Pads
 from anysim_soft.spec import MOST, PadSpec, SoftSpec
 from anysim_soft.subworld import FlexSource, Joint, ProxyMass, Scenery, SubWorld
+from anysim_soft.surfaces import Surfaced
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -41,6 +42,8 @@ class Soft(CoSolver):
     drawn = True
     label: ClassVar[str]
     drawn_keys: ClassVar[tuple[str, ...]] = ("drag", "friction")
+    meets_surfaces: ClassVar[bool] = False
+    """Whether it meets the surfaces of other matter."""
 
     # ------------------------------------------------------------------ what kinds differ in
 
@@ -100,12 +103,10 @@ class Soft(CoSolver):
         self._step = world.physics.dt / self.soft.substeps
         self._threads = max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
         self._worlds: dict[int, tuple[bytes, SubWorld]] = {}
+        self.under: Sequence[Surfaced] = ()
         self.values = self.remember("values", len(self.drawn_keys))
         self.frame, self.pending = self.remember("frame", 7), self.remember("pending", k, 6)
-        built = ProxyMass(np.ones(k), np.zeros((k, 3)), np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (k, 1)))
-        source = self.source(dict.fromkeys(self.drawn_keys, 0.1), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
-        example = SubWorld(source, self.scenery, built, (), self._step, self._gravity)
-        self.faces = example.faces
+        source = self._example_source()
         self._nodes = np.zeros(0, dtype=np.intp)
         self._holders = np.zeros(0, dtype=np.intp)
         for side, name in self.attached_sides():
@@ -113,13 +114,31 @@ class Soft(CoSolver):
             self._nodes = np.concatenate([self._nodes, nodes])
             self._holders = np.append(self._holders, [self._met(name, "attached", loose=False)] * len(nodes))
         self.anchors = self.remember("anchors", len(self._nodes), 3)
-        joints = self._joints(self.anchors[0])
-        example = SubWorld(source, self.scenery, built, joints, self._step, self._gravity, self.pads.slots(self.met))
+        example = self._example(source)
+        self.faces = example.faces
         size = len(example.points())
         self.x, self.v = self.remember("x", size, 3), self.remember("v", size, 3)
         self.moved, self.state_row = self.remember("moved", 6), self.remember("state", example.state_size)
         if len(self.pads):
             self.pads.remember(self, size, len(self.faces))
+
+    def joined(self, families: Sequence[Family]) -> None:
+        if self.meets_surfaces:
+            self.under = [one for one in families if isinstance(one, Surfaced)]
+        if self.under:  # their points are in the state of its solver too
+            self.state_row = self.remember("state", self._example(self._example_source()).state_size)
+
+    def _example_source(self) -> FlexSource:
+        """The flex with some parameters: sizes and faces do not depend on them."""
+        return self.source(dict.fromkeys(self.drawn_keys, 0.1), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+
+    def _example(self, source: FlexSource) -> SubWorld:
+        """A model of it before anything is known of bodies and surfaces but how many they are."""
+        k = len(self.met)
+        built = ProxyMass(np.ones(k), np.zeros((k, 3)), np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (k, 1)))
+        joints, slots = self._joints(self.anchors[0]), self.pads.slots(self.met)
+        surfaces = [one.surface(0) for one in self.under]
+        return SubWorld(source, self.scenery, built, joints, self._step, self._gravity, slots, surfaces)
 
     def _joints(self, anchors: Array) -> list[Joint]:
         rows = zip(self._nodes.tolist(), self._holders.tolist(), anchors, strict=True)
@@ -183,7 +202,8 @@ class Soft(CoSolver):
     def sub_world(self, env: int) -> SubWorld:
         """The model of an env: all that it is made of is in the memory, and it is made anew when that has changed."""
         parts = (self.values, self.frame, self.anchors, self._mass, self._com, self._inertia)
-        key = b"".join(part[env].tobytes() for part in parts)
+        surfaces = [one.surface(env) for one in self.under]
+        key = b"".join([*(part[env].tobytes() for part in parts), *(one.mass.tobytes() for one in surfaces)])
         made = self._worlds.get(env)
         if made is None or made[0] != key:
             mass = np.where(self._held, np.inf, self._mass[env] * self._heavier)
@@ -192,7 +212,8 @@ class Soft(CoSolver):
             source = self.source(values, self.frame[env])
             joints = self._joints(self.anchors[env])
             slots = self.pads.slots(self.met)
-            made = (key, SubWorld(source, self.scenery, bodies, joints, self._step, self._gravity, slots))
+            rest = self.scenery, bodies, joints, self._step, self._gravity, slots, surfaces
+            made = (key, SubWorld(source, *rest))
             self._worlds[env] = made
         return made[1]
 
@@ -218,9 +239,12 @@ class Soft(CoSolver):
             if self.pads.pinch:
                 shut, openings = self.pads.shut(joint_pos[row]), self.pads.openings(joint_pos[row])
                 sub.jaws.drive(sub.data, openings, shut, bodies.friction[row], duration)
+            sub.surfaces.put(sub.data, [one.moving(env) for one in self.under])
             done = sub.step(self.soft.substeps, self.parameter("drag", env), env)
             if len(self.pads):
                 self.pads.felt(env, sub.pulls())
+            for other, pushed in zip(self.under, sub.surfaces.impulses, strict=True):
+                other.touch(env, pushed)
             self.after_solve(env, sub)
             self.received[env] += done.received
             sub.save(self.state_row[env])

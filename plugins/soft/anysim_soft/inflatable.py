@@ -13,14 +13,13 @@ import numpy as np
 from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.errors import PluginError
 from anysim.families.base import FamilySetting
-from anysim.families.cosolver import about_origin
 from anysim.math import pose as P
-from anysim_particles.skins import Skin, offer
+from anysim_particles.skins import Skin
 from anysim_soft.cloth import CHECKED, membrane, solver_of
-from anysim_soft.deformable import contact_of, numbers
-from anysim_soft.family import Soft
+from anysim_soft.flex_xml import contact_of, numbers
+from anysim_soft.shell_matter import ShellMatter
 from anysim_soft.spec import InflatableSpec, SoftSpec
-from anysim_soft.subworld import FlexSource, SubWorld
+from anysim_soft.subworld import FlexSource
 
 AIR = 101_325.0
 """[Pa] around it."""
@@ -30,13 +29,12 @@ MOST_STRAIN = 0.1
 """Of the skin, up to which it is taken to be as stiff as at first."""
 
 
-class Inflatable(Soft):
+class Inflatable(ShellMatter):
     """A balloon: a thin elastic ball that holds gas at one temperature.
 
     Attributes:
         pressure: (N,) [Pa] of the gas above that of the air, as it acts.
         gas: (N,) [J] its pressure times its volume, n R T.
-        wet: (N, V, 3) [N s] what liquids gave to its points, and its solver has not yet.
     """
 
     spec = InflatableSpec
@@ -55,8 +53,6 @@ class Inflatable(Soft):
         self._points, self._faces = sphere(self._spec.subdivisions)
         super().__init__(setting)
         self.pressure, self.gas = self.remember("gas_pressure"), self.remember("gas")
-        self.wet = self.remember("wet", len(self._points), 3)
-        offer(setting.engine, self)
 
     @classmethod
     def count(cls, spec: SoftSpec) -> int:
@@ -103,7 +99,7 @@ class Inflatable(Soft):
             due = self.gas[env] / now - absolute - absolute / now * swells * h
             self.pressure[env] += share * due
             acts = self.pressure[env] - DAMPED * h / yields * swells
-            return acts * slope + self.wet[env] / (h * self.soft.substeps)
+            return acts * slope + self.pushed(env)
 
         return FlexSource(xml, np.zeros(len(points), dtype=bool), mass, solver_of(len(points)), {}, adjust, inner=press)
 
@@ -129,24 +125,11 @@ class Inflatable(Soft):
             self.pressure[env] = pressure
             self.gas[env] = (AIR + pressure) * volume(self.x[env], self._faces)
 
-    def after_solve(self, env: int, sub: SubWorld) -> None:
-        self.wet[env] = 0.0
-
     # ------------------------------------------------------------------ liquids
 
     def skin(self, env: int) -> Skin:
         """What liquids meet of it in an env."""
         return Skin(self.x[env], self.v[env], self.sub_world(env).mass, self._faces, self._spec.skin)
-
-    def splash(self, env: int, impulse: Array) -> None:
-        """Its points get impulses (V, 3) [N s] from a liquid."""
-        self.wet[env] += impulse
-        self.received[env] += about_origin(impulse, self.x[env])
-
-    def momentum(self, env_ids: Array) -> Array:
-        """Of the matter, and of what its points will get."""
-        wet = [about_origin(self.wet[env], self.x[env]) for env in env_ids.tolist()]
-        return super().momentum(env_ids) + np.array(wet).reshape(-1, 6)
 
     # ------------------------------------------------------------------ what it means
 

@@ -8,8 +8,8 @@ from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
 from anysim.families.base import FamilyState
 from anysim.math import pose as P
-from anysim_soft.deformable import contact_of, numbers
 from anysim_soft.family import Soft
+from anysim_soft.flex_xml import contact_of, numbers
 from anysim_soft.spec import PadSpec, RopeSpec, SoftSpec
 from anysim_soft.subworld import STIFF, FlexSource
 
@@ -22,6 +22,7 @@ class Rope(Soft):
     """A rope with a length, a radius and a density."""
 
     spec = RopeSpec
+    meets_surfaces = True
     label = "rope"
     tint = (0.8, 0.65, 0.4)
     drawn_keys = (*Soft.drawn_keys, "density")

@@ -20,6 +20,7 @@ from anysim_mujoco.geoms import add_assets, add_geom
 from anysim_soft import kernels
 from anysim_soft.kernels import Exchange
 from anysim_soft.pinch import Jaw, Jaws, add_jaw
+from anysim_soft.surfaces import Surface, Surfaces, loosen
 
 HEAVY = 1e4
 """[kg], [kg m^2] of a body that joints hold."""
@@ -141,13 +142,13 @@ class SubWorld:
         dt: float,
         gravity: Array,
         slots: Slots = NOTHING,
+        surfaces: Sequence[Surface] = (),
     ) -> None:
         self.scenery, self.gravity, self.source = scenery, np.array(gravity, dtype=float), source
-        self.model = model = _compiled(source, scenery, bodies, joints, slots, dt, gravity)
+        self.model = model = _compiled(source, scenery, bodies, joints, slots, surfaces, dt, gravity)
         self.data = mujoco.MjData(model)
         self.held = ~np.isfinite(bodies.mass)
-        nodes = model.flex_nodebodyid if model.flex_interp[0] else model.flex_vertbodyid
-        self.nodes = np.array(nodes, dtype=np.intp)
+        self.nodes = np.array(_nodes(model), dtype=np.intp)
         self._moving = self.nodes[model.body_dofnum[self.nodes] > 0]
         self._dofs = model.body_dofadr[self._moving][:, None] + np.arange(3)
         self.mass = np.array(model.body_mass[self._moving])
@@ -166,6 +167,7 @@ class SubWorld:
         connects = np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_CONNECT))
         self._slots = connects[len(connects) - len(slots.places) :]
         self.jaws = Jaws(model, slots.jaws, float(model.flex_friction[0, 0]))
+        self.surfaces = Surfaces(model, len(surfaces))
         self.faces = _faces(model)
         self.state_size = int(mujoco.mj_stateSize(model, STATE))
 
@@ -208,7 +210,7 @@ class SubWorld:
 
     def points(self) -> Array:
         """(V, 3) [m] the vertices."""
-        return self.data.flexvert_xpos.copy()
+        return self.data.flexvert_xpos[: self.model.flex_vertnum[0]].copy()
 
     def node_places(self) -> Array:
         """(V, 3) [m] the nodes."""
@@ -273,6 +275,7 @@ class SubWorld:
             if self._uneven:
                 self._even_contacts()
             mujoco.mj_step2(model, data)
+            self.surfaces.account(data, h)
             kernels.account(data.qfrc_constraint, *frames, *bodies, *points, outer, h, self._pinned, done)
             if before is not None:  # what holds it has no force of its own in MuJoCo: it gives what is missing
                 mujoco.mj_kinematics(model, data)
@@ -300,12 +303,17 @@ class SubWorld:
             mujoco.mj_referenceConstraint(self.model, data)
 
 
+def _nodes(model: Any) -> Array:
+    """(V,) the bodies of the flex itself; those of surfaces come after it."""
+    return model.flex_nodebodyid if model.flex_interp[0] else model.flex_vertbodyid[: model.flex_vertnum[0]]
+
+
 def _faces(model: Any) -> Array:
     """(F, 3) int32 triangles of the surface, outward; none of a line."""
     dim = int(model.flex_dim[0])
     if dim == 1:
         return np.zeros((0, 3), dtype=np.int32)
-    flat = model.flex_elem if dim == 2 else model.flex_shell
+    flat = model.flex_elem[: 3 * model.flex_elemnum[0]] if dim == 2 else model.flex_shell
     return np.array(flat, dtype=np.int32).reshape(-1, 3)
 
 
@@ -315,18 +323,21 @@ def _compiled(
     bodies: ProxyMass,
     joints: Sequence[Joint],
     slots: Slots,
+    surfaces: Sequence[Surface],
     dt: float,
     gravity: Array,
 ) -> Any:
     options = " ".join(f'{key}="{value}"' for key, value in source.options.items())
     pull = " ".join(repr(float(g)) for g in gravity)
+    beside = "".join(surface.xml(number) for number, surface in enumerate(surfaces))
     spec = mujoco.MjSpec.from_string(
         f'<mujoco><compiler alignfree="false" fusestatic="false"/>'
         f'<option timestep="{dt!r}" gravity="{pull}" {options}><flag autoreset="disable"/></option>'
-        f"<worldbody>{source.xml}</worldbody></mujoco>"
+        f"<worldbody>{source.xml}{beside}</worldbody></mujoco>"
     )
     model = spec.compile()
-    nodes = model.flex_nodebodyid if model.flex_interp[0] else model.flex_vertbodyid
+    nodes = _nodes(model)
+    loosen(spec, model, surfaces)
     for place, body in enumerate(nodes):
         element = spec.body(model.body(body).name)
         if len(source.mass):
