@@ -92,7 +92,8 @@ class LibraryRequirement:
     def __str__(self) -> str:
         """The versions that are taken, in words."""
         refused = "; ".join(f"{'.'.join(map(str, numbers))}: {why}" for numbers, why in self.wrong.items())
-        return f"{'.'.join(map(str, self.minimum))} or newer" + (f"; refused: {refused}" if refused else "")
+        taken = f"{'.'.join(map(str, self.minimum))} or newer{', or as '.join(['', *self.also])}"
+        return taken + (f"; refused: {refused}" if refused else "")
 
 
 @cache

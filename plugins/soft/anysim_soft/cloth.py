@@ -18,18 +18,17 @@ from anysim.math import pose as P
 from anysim_soft.deformable import OPTIONS, contact_of, numbers, on_side
 from anysim_soft.family import Soft
 from anysim_soft.spec import FemClothSpec, SoftSpec
-from anysim_soft.subworld import FlexSource
+from anysim_soft.subworld import FAULTY, FlexSource
 
-FAULTY, RIGHT = "3.17", "4.0"
-"""The versions of MuJoCo whose constants are known: these are replaced, those are kept."""
+KNOWN = "3.17", "4.0"
+"""The versions of MuJoCo whose constants are known."""
 MANY = 150
 """Points of sheets and skins from which on conjugate gradients cost less than Newton's method: 0.6 of it for a balloon
 of 162, less than half for a sheet of 400."""
 GRADIENTS = {**OPTIONS, "solver": "CG", "tolerance": 1e-13}
 """What is lost of the momentum to this tolerance is a hundred-millionth of what is traded."""
 BENT = 4 / 3
-"""How much too small the energy of bending is in MuJoCo 3.17 where Poisson's ratio is 0; otherwise 1 + that ratio more.
-"""
+"""How much too small the energy of bending is in 3.17 where Poisson's ratio is 0; otherwise 1 + that ratio more."""
 
 
 class FemCloth(Soft):
@@ -93,7 +92,7 @@ class FemCloth(Soft):
             f"{contact_of(values['friction'], self._step)}</flexcomp>"
         )
         own = young * thickness**3 / 12
-        has = own / (BENT * (1.0 + poisson)) if faulty() else own / (1.0 - poisson**2)
+        has = own / (BENT * (1.0 + poisson)) if FAULTY else own / (1.0 - poisson**2)
         more = (own if values["bending"] < 0 else values["bending"]) / has
 
         def adjust(model: Any) -> None:
@@ -115,24 +114,19 @@ def solver_of(count: int) -> Mapping[str, object]:
     return GRADIENTS if count >= MANY else OPTIONS
 
 
-def faulty() -> bool:
-    """Whether the installed MuJoCo has wrong elastic constants of sheets."""
-    return mujoco.__version__.startswith(f"{FAULTY}.")
-
-
 def require_constants(setting: FamilySetting) -> None:
-    """Raises PluginError where those of the installed MuJoCo are not known."""
-    if not faulty() and not mujoco.__version__.startswith(f"{RIGHT}."):
+    """Raises PluginError where the elastic constants of the installed MuJoCo are not known."""
+    if not mujoco.__version__.startswith(tuple(f"{version}." for version in KNOWN)):
         raise PluginError(
             f"world.families.{setting.name}: the elastic constants that MuJoCo {mujoco.__version__} has for sheets are "
-            f"not known, those of {FAULTY} and {RIGHT} are; install mujoco=={FAULTY}.0, or mujoco-core=={RIGHT}.1 in "
-            f"its place"
+            f"not known, those of {' and '.join(KNOWN)} are; install mujoco=={KNOWN[0]}.0, or in its place "
+            f"mujoco-core=={KNOWN[1]}.1"
         )
 
 
 def stretch(model: Any, young: float, poisson: float, thickness: float) -> None:
     """Give the triangles of a model the right stiffness, where MuJoCo's is wrong."""
-    if faulty():
+    if FAULTY:
         model.flex_stiffness.reshape(-1, 21)[:, :6] = membrane(model, young, poisson, thickness)
 
 
