@@ -9,6 +9,7 @@ LIBRARY = LibraryRequirement(
     lacks="has no mujoco.batch",
     remedy="pip install 'mujoco>=3.17,!=4.0.0'",
     wrong={(4, 0, 0): "its sparse solver is wrong where articulated bodies touch each other"},
+    also={"mujoco-core": "pip install 'mujoco-core>=4.0.1'"},  # all of MuJoCo 4 that anysim uses
 )
 
 _APPROXIMATE = {

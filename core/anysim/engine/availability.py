@@ -4,7 +4,7 @@ import platform
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache
 from importlib import metadata
@@ -47,6 +47,8 @@ class LibraryRequirement:
         remedy: the command that installs a good one.
         wrong: versions whose results cannot be trusted, and why.
         machines: the kinds of machine that it has wheels for on Linux; empty where it can be built on any.
+        also: other distributions that bring the same library, and the command that installs a good one of each. Of one
+            version with `package` they are its parts; of another one they and it overwrite each other's files.
     """
 
     package: str
@@ -55,10 +57,21 @@ class LibraryRequirement:
     remedy: str
     wrong: Mapping[Version, str] = field(default_factory=dict[Version, str])
     machines: tuple[str, ...] = ()
+    also: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def availability(self) -> Availability:
         """Whether the installed version will do."""
-        return self.judge(installed_version(self.package))
+        found = {name: version for name in (self.package, *self.also) if (version := installed_version(name))}
+        if len(found) < 2:
+            name, version = next(iter(found.items()), (self.package, ""))
+            one = self if name == self.package else replace(self, package=name, remedy=self.also[name])
+            return one.judge(version)
+        remedy = f"pip uninstall -y {' '.join(found)}, then {' or '.join([self.remedy, *self.also.values()])}"
+        if len(set(found.values())) == 1:
+            return replace(self, remedy=remedy).judge(found[self.package])
+        both = " and ".join(f"{name} {version}" for name, version in found.items())
+        why = f"{both} are installed, and each has overwritten files of the other: keep one"
+        return Availability(False, next(iter(found.values())), (why,), remedy)
 
     def judge(self, version: str) -> Availability:
         """Whether a version will do, as `importlib.metadata.version` gives it, or an empty string for none."""
@@ -79,7 +92,8 @@ class LibraryRequirement:
     def __str__(self) -> str:
         """The versions that are taken, in words."""
         refused = "; ".join(f"{'.'.join(map(str, numbers))}: {why}" for numbers, why in self.wrong.items())
-        return f"{'.'.join(map(str, self.minimum))} or newer" + (f"; refused: {refused}" if refused else "")
+        taken = f"{'.'.join(map(str, self.minimum))} or newer{', or as '.join(['', *self.also])}"
+        return taken + (f"; refused: {refused}" if refused else "")
 
 
 @cache

@@ -196,7 +196,8 @@ _NAME = re.compile(r"[A-Za-z0-9._-]+")
 def package_versions() -> dict[str, str]:
     """Versions of the distributions that offer something to anysim and of what they require directly, sorted by name.
 
-    Extras are left out; what is not installed is not listed.
+    Extras are left out; what is not installed is not listed, but what offers a module of its name is, as `mujoco-core`
+    does for `mujoco`.
     """
     return dict(_versions(tuple(registry.participants())))
 
@@ -211,8 +212,12 @@ def _versions(participants: tuple[str, ...]) -> dict[str, str]:
             found = _NAME.match(requirement)
             if found is not None and "extra ==" not in requirement:
                 names.add(_normal(found[0]))
-    present = {name: known.get(name) or _installed(name) for name in sorted(names)}
-    return {name: dist.version for name, dist in present.items() if dist is not None}
+    present = {name: known.get(name) or _installed(name) for name in names}
+    if missing := [name for name, dist in present.items() if dist is None]:
+        offering = metadata.packages_distributions()  # reads the files of all distributions: half a second
+        others = {_normal(other) for name in missing for other in offering.get(name.replace("-", "_"), ())}
+        present |= {other: _installed(other) for other in others}
+    return {name: dist.version for name, dist in sorted(present.items()) if dist is not None}
 
 
 def _installed(name: str) -> metadata.Distribution | None:

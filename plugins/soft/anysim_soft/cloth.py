@@ -2,7 +2,7 @@
 
 MuJoCo 3.17 has wrong constants for both: a strip gets 3.6 times as much longer under its weight as it should, and its
 energy in bending is 3/4 of what it should be, less with Poisson's ratio. They are worked out here, and written into its
-model.
+model. Those of MuJoCo 4.0 are right.
 """
 
 from collections.abc import Mapping
@@ -19,17 +19,17 @@ from anysim_soft.deformable import OPTIONS, on_side
 from anysim_soft.family import Soft
 from anysim_soft.flex_xml import contact_of, numbers
 from anysim_soft.spec import FemClothSpec, SoftSpec
-from anysim_soft.subworld import FlexSource
+from anysim_soft.subworld import FAULTY, FlexSource
 
-CHECKED = "3.17"
-"""The version of MuJoCo whose constants these replace."""
+KNOWN = "3.17", "4.0"
+"""The versions of MuJoCo whose constants are known."""
 MANY = 150
 """Points of sheets and skins from which on conjugate gradients cost less than Newton's method: 0.6 of it for a balloon
 of 162, less than half for a sheet of 400."""
 GRADIENTS = {**OPTIONS, "solver": "CG", "tolerance": 1e-13}
 """What is lost of the momentum to this tolerance is a hundred-millionth of what is traded."""
 BENT = 4 / 3
-"""How much too small MuJoCo's energy of bending is where Poisson's ratio is 0; otherwise 1 + that ratio more."""
+"""How much too small the energy of bending is in 3.17 where Poisson's ratio is 0; otherwise 1 + that ratio more."""
 
 
 class FemCloth(Soft):
@@ -41,11 +41,7 @@ class FemCloth(Soft):
     drawn_keys = (*Soft.drawn_keys, "density", "young", "poisson", "damping", "thickness", "bending")
 
     def __init__(self, setting: FamilySetting) -> None:
-        if not mujoco.__version__.startswith(f"{CHECKED}."):
-            raise PluginError(
-                f"world.families.{setting.name}: fem_cloth writes elastic constants for MuJoCo {CHECKED}, and those of "
-                f"{mujoco.__version__} are not known; install mujoco=={CHECKED}.0"
-            )
+        require_constants(setting)
         super().__init__(setting)
 
     @classmethod
@@ -97,10 +93,11 @@ class FemCloth(Soft):
             f"{contact_of(values['friction'], self._step)}</flexcomp>"
         )
         own = young * thickness**3 / 12
-        more = BENT * (1.0 + poisson) * (1.0 if values["bending"] < 0 else values["bending"] / own)
+        has = own / (BENT * (1.0 + poisson)) if FAULTY else own / (1.0 - poisson**2)
+        more = (own if values["bending"] < 0 else values["bending"]) / has
 
         def adjust(model: Any) -> None:
-            model.flex_stiffness.reshape(-1, 21)[:, :6] = membrane(model, young, poisson, thickness)
+            stretch(model, young, poisson, thickness)
             model.flex_bending[:] *= more
 
         sides = {side: on_side(points, size, side) for side in spec.attached}
@@ -116,6 +113,22 @@ class FemCloth(Soft):
 def solver_of(count: int) -> Mapping[str, object]:
     """MuJoCo's options for a sheet or a skin of so many points."""
     return GRADIENTS if count >= MANY else OPTIONS
+
+
+def require_constants(setting: FamilySetting) -> None:
+    """Raises PluginError where the elastic constants of the installed MuJoCo are not known."""
+    if not mujoco.__version__.startswith(tuple(f"{version}." for version in KNOWN)):
+        raise PluginError(
+            f"world.families.{setting.name}: the elastic constants that MuJoCo {mujoco.__version__} has for sheets are "
+            f"not known, those of {' and '.join(KNOWN)} are; install mujoco=={KNOWN[0]}.0, or in its place "
+            f"mujoco-core=={KNOWN[1]}.1"
+        )
+
+
+def stretch(model: Any, young: float, poisson: float, thickness: float) -> None:
+    """Give the triangles of a model the right stiffness, where MuJoCo's is wrong."""
+    if FAULTY:
+        model.flex_stiffness.reshape(-1, 21)[:, :6] = membrane(model, young, poisson, thickness)
 
 
 def membrane(model: Any, young: float, poisson: float, thickness: float) -> Array:

@@ -6,8 +6,8 @@ which the skin breathes is taken out of it in each step. At rest the law holds e
 """
 
 from collections.abc import Mapping
+from typing import Any
 
-import mujoco
 import numpy as np
 
 from anysim.conventions import Array, wxyz_from_xyzw
@@ -15,7 +15,7 @@ from anysim.errors import PluginError
 from anysim.families.base import FamilySetting
 from anysim.math import pose as P
 from anysim_particles.skins import Skin
-from anysim_soft.cloth import CHECKED, membrane, solver_of
+from anysim_soft.cloth import require_constants, solver_of, stretch
 from anysim_soft.flex_xml import contact_of, numbers
 from anysim_soft.shell_matter import ShellMatter
 from anysim_soft.spec import InflatableSpec, SoftSpec
@@ -43,11 +43,7 @@ class Inflatable(ShellMatter):
     drawn_keys = ("density", "drag", "friction", "young", "poisson", "damping", "thickness", "pressure")
 
     def __init__(self, setting: FamilySetting) -> None:
-        if not mujoco.__version__.startswith(f"{CHECKED}."):
-            raise PluginError(
-                f"world.families.{setting.name}: inflatable writes elastic constants for MuJoCo {CHECKED}, and those "
-                f"of {mujoco.__version__} are not known; install mujoco=={CHECKED}.0"
-            )
+        require_constants(setting)
         assert isinstance(setting.spec, InflatableSpec)
         self._spec = setting.spec
         self._points, self._faces = sphere(self._spec.subdivisions)
@@ -86,8 +82,8 @@ class Inflatable(ShellMatter):
             f"{contact_of(values['friction'], self._step)}</flexcomp>"
         )
 
-        def adjust(model: mujoco.MjModel) -> None:
-            model.flex_stiffness.reshape(-1, 21)[:, :6] = membrane(model, young, poisson, thickness)
+        def adjust(model: Any) -> None:
+            stretch(model, young, poisson, thickness)
 
         def press(env: int, x: Array, v: Array) -> Array:
             h = self._step

@@ -31,6 +31,8 @@ GRIP = (0.95, 0.99, 0.001, 0.5, 2.0)
 AWAY = -1e4
 """[m] height of the proxy of a body that is not there."""
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+FAULTY = mujoco.__version__.startswith("3.")
+"""Contacts of quadratic elements, and elastic constants of sheets, are wrong, and are put right."""
 _DENSE = (np.zeros(0, dtype=np.int32),) * 3
 
 
@@ -154,7 +156,8 @@ class SubWorld:
         self.mass = np.array(model.body_mass[self._moving])
         self._axis = np.full(model.nv, -1)
         self._axis[self._dofs] = np.arange(3)
-        self._uneven, self._sparse = bool(model.flex_interp[0]), bool(mujoco.mj_isSparse(model))
+        self._uneven = FAULTY and bool(model.flex_interp[0])
+        self._sparse = bool(mujoco.mj_isSparse(model))
         self._pinned = len(self._moving) < len(self.nodes)
         self._outer, self._no_inner = np.zeros((2, len(self._moving), 3))
         k, s = len(scenery.met), len(scenery.still)
@@ -294,7 +297,7 @@ class SubWorld:
     def _even_contacts(self) -> None:
         """Make the rows of contacts push the flex as much as what it touches.
 
-        Quadratic elements weigh some nodes negatively, and MuJoCo leaves these out of its Jacobian: what is left
+        Quadratic elements weigh some nodes negatively, and MuJoCo 3 leaves these out of its Jacobian: what is left
         sums up to more than one, and 15 to 20 % of the momentum would come from nowhere. Here it is scaled to one.
         """
         data, kind = self.data, int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)

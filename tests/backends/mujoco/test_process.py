@@ -172,25 +172,43 @@ def test_the_package_and_availability_import_nothing_heavy(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("version", "available", "word"),
+    ("installed", "version", "word", "remedy"),
     [
-        ("", False, "not installed"),
-        ("3.16.2", False, "mujoco.batch"),
-        ("4.0.0", False, "sparse solver"),
-        ("3.17.0", True, ""),
-        ("4.0.1", True, ""),
-        ("4.1", True, ""),
+        ({}, "", "the package mujoco is not installed", "pip install 'mujoco>="),
+        ({"mujoco": "3.16.2"}, "3.16.2", "mujoco.batch", "pip install 'mujoco>="),
+        ({"mujoco": "4.0.0"}, "4.0.0", "mujoco 4.0.0 is unusable: its sparse solver", "pip install 'mujoco>="),
+        ({"mujoco": "3.17.0"}, "3.17.0", "", ""),
+        ({"mujoco": "4.0.1"}, "4.0.1", "", ""),
+        ({"mujoco": "4.1"}, "4.1", "", ""),
+        ({"mujoco-core": "4.0.1"}, "4.0.1", "", ""),
+        ({"mujoco-core": "4.0.0"}, "4.0.0", "mujoco-core 4.0.0 is unusable: its sparse", "pip install 'mujoco-core>="),
+        (
+            {"mujoco": "3.17.0", "mujoco-core": "4.0.1"},
+            "3.17.0",
+            "mujoco 3.17.0 and mujoco-core 4.0.1 are installed, and each has overwritten files of the other: keep one",
+            "pip uninstall -y mujoco mujoco-core, then pip install 'mujoco>=",
+        ),
+        # from 4.0 on `mujoco` is a name for `mujoco-core` of the same version and what it does not need
+        ({"mujoco": "4.0.1", "mujoco-core": "4.0.1"}, "4.0.1", "", ""),
+        (
+            {"mujoco": "4.0.0", "mujoco-core": "4.0.0"},
+            "4.0.0",
+            "sparse solver",
+            "pip uninstall -y mujoco mujoco-core, then pip install 'mujoco>=",
+        ),
     ],
 )
-def test_availability_by_version(monkeypatch, version, available, word):
-    """Known-bad and too old versions come with the remedy."""
+def test_availability_by_what_is_installed(monkeypatch, installed, version, word, remedy):
+    """Known-bad and too old versions, and two of them at once, come with the remedy."""
     from anysim_mujoco import declared
 
-    monkeypatch.setattr("anysim.engine.availability.installed_version", lambda _: version)
+    monkeypatch.setattr("anysim.engine.availability.installed_version", lambda name: installed.get(name, ""))
     here = declared.LIBRARY.availability()
-    assert here.available is available
+    assert here.available is (word == "")
+    assert here.version == version
     assert word in " ".join(here.missing)
-    assert ("pip install" in here.remedy) is not available
+    assert here.remedy.startswith(remedy)
+    assert ("pip install" in here.remedy) is not here.available
 
 
 def _resident_mb() -> float:

@@ -1,8 +1,11 @@
 """A sheet against formulas, with the tolerances that the docs state."""
 
+import mujoco
 import numpy as np
 import pytest
 
+from anysim.errors import PluginError
+from anysim_soft.cloth import membrane
 from tests.plugins.soft.softs import ALL, begun, run_of, wait, with_ball
 
 G = 9.81
@@ -41,6 +44,30 @@ def test_a_strip_that_lies_on_its_ends_bends_as_a_plate(poisson, stiffer):
         middle = np.abs(it.x[0, :, 0]) < 1e-3
         sunk = 1.0 - it.x[0, middle, 2].mean()
     assert sunk == pytest.approx(5 * 1000 * thickness * G * length**4 / (384 * rigidity), rel=0.06)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3])
+def test_the_constants_in_the_model_are_those_of_the_formulas(poisson):
+    """With MuJoCo 4 its own, which are right; 3.17 gets others."""
+    young, thickness = 1e6, 0.001
+    sheet = {"kind": "fem_cloth", "size": [0.3, 0.2], "points": [4, 4], "young": young, "poisson": poisson}
+    with begun(run_of({**sheet, "thickness": thickness})) as (_, it):
+        model = it.sub_world(0).model
+        found, expected = model.flex_stiffness.reshape(-1, 21)[:, :6], membrane(model, young, poisson, thickness)
+        assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+        own = model.flex_bending.sum()
+    with begun(run_of({**sheet, "thickness": thickness, "bending": 3 * young * thickness**3 / 12})) as (_, it):
+        assert it.sub_world(0).model.flex_bending.sum() == pytest.approx(3 * own, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "matter", [{"kind": "fem_cloth", "size": [0.3, 0.3]}, {"kind": "inflatable"}], ids=lambda matter: matter["kind"]
+)
+def test_a_mujoco_whose_constants_are_not_known_is_refused(monkeypatch, matter):
+    monkeypatch.setattr(mujoco, "__version__", "4.1.0")
+    words = r"families\.it: .* that MuJoCo 4\.1\.0 has .* install mujoco==3\.17\.0, or in its place mujoco-core=="
+    with pytest.raises(PluginError, match=words), begun(run_of(matter)):
+        pass
 
 
 @pytest.mark.slow

@@ -24,6 +24,7 @@ _POSE, _WORLD = "pos quat alt", "the world's `physics` has it"
 _FLUID = "shapes are dragged by their inertia alone"
 _NUMBERS = "numbers of a program's own"
 _MIXED = "one that mixes a time constant and a damping is MuJoCo's default, as in MuJoCo"
+_YIELD = "springs are elastic"
 _LAWS = "a motor, position or velocity drive of one hinge or slide becomes a drive; others are left out"
 
 FIELDS: Mapping[str, tuple[Row, ...]] = {
@@ -43,6 +44,7 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_ABOUT, "solref_limit solref_friction", _MIXED),
         Row(_ABOUT, "stiffness", "the linear part of a polynomial; none of a free joint"),
         Row(_OUT, "actgravcomp", "a compensated weight is no load of a drive"),
+        Row(_OUT, "springyield", _YIELD),
         Row(_OUT, "userdata", _NUMBERS),
         Row(_IDLE, "align", "it is of how MuJoCo computes"),
     ),
@@ -57,6 +59,7 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_OUT, "fluid_ellipsoid fluid_coefs", _FLUID),
         Row(_OUT, "surfacevel", "surfaces do not move by themselves"),
         Row(_OUT, "adhesion", "surfaces do not stick"),
+        Row(_OUT, "castshadow", "shadows are the engine's: all shapes cast them, or none"),
         Row(_OUT, "userdata", _NUMBERS),
         Row(_OUT, "plugin", "it is MuJoCo's alone"),
     ),
@@ -92,6 +95,7 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_EXACT, "solimp_limit margin solimp_friction", "as the compliance of a limit and of dry friction"),
         Row(_ABOUT, "solref_limit solref_friction", _MIXED),
         Row(_OUT, "actfrclimited actfrcrange", "each drive has a limit of its own"),
+        Row(_OUT, "springyield", _YIELD),
         Row(_OUT, "userdata", _NUMBERS),
         Row(_IDLE, "material rgba width", "it is of how a tendon is drawn"),
     ),
@@ -118,6 +122,7 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_ABOUT, "qpos", "the one that is called `home`"),
         Row(_OUT, "qvel", "everything begins at rest"),
         Row(_OUT, "act ctrl", "commands are a task's"),
+        Row(_OUT, "plastic", _YIELD),
         Row(_ABOUT, "mpos mquat", "those of the one that is called `home`, in a scene; a world places an asset"),
         Row(_IDLE, "time", "an episode begins at 0"),
     ),

@@ -60,7 +60,7 @@ class GymnasiumRobotics:
             env = self._gymnasium.make(task)
         except Exception as error:
             raise PluginError(
-                f"{self.version} cannot make '{task}' with mujoco {metadata.version('mujoco')}: "
+                f"{self.version} cannot make '{task}' with mujoco {import_module('mujoco').__version__}: "
                 f"{type(error).__name__} in {_place(error)}; Adroit and maze environments run with every mujoco 3"
             ) from error
         return GymnasiumEnv(env, int(env.spec.max_episode_steps))
