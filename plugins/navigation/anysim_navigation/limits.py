@@ -69,9 +69,8 @@ class BaseLimits(NamedTuple):
         """
         if self.discs.ndim != 2 or self.discs.shape[1] != 3 or not len(self.discs) or (self.discs[:, 2] <= 0).any():
             raise AnysimError(f"the discs of a {self.kind} base: expected rows x, y and a radius above 0")
-        if not (
-            self.high[0] > 0 and (self.low <= 0).all() and (self.high >= 0).all() and (self.acceleration > 0).all()
-        ):
+        meant = (self.low <= 0).all() and (self.high >= 0).all() and (self.acceleration > 0).all()
+        if not (meant and self.high[0] > 0):
             raise AnysimError(
                 f"limits of a {self.kind} base from {self.low.tolist()} to {self.high.tolist()}: expected 0 within all "
                 "of them, a speed forward above 0, and accelerations above 0"
@@ -86,7 +85,7 @@ def limits_of(
     turn: float,
     side: float | None = None,
     back: float | None = None,
-    acceleration: tuple[float, float] = (1.0, 3.0),
+    acceleration: tuple[float, float] | None = None,
     turning_radius: float = 0.0,
 ) -> BaseLimits:
     """Limits with what is usual for a kind where nothing is given.
@@ -97,7 +96,7 @@ def limits_of(
         speed, turn: forward [m/s], and turning [rad/s].
         side: [m/s] to both sides; as forward for what is holonomic, a third of it on legs, else none.
         back: [m/s] backwards; as forward for what is holonomic, else half of it.
-        acceleration: [m/s^2], [rad/s^2].
+        acceleration: [m/s^2], [rad/s^2]; (1, 3), on legs (0.6, 1.5): who is to turn about within a stride may fall.
         turning_radius: [m] of a car.
     """
     if kind in (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN):
@@ -109,7 +108,8 @@ def limits_of(
     if kind is BaseKind.ACKERMANN and turning_radius <= 0:
         raise AnysimError("a car has a turning_radius above 0 [m]: wheelbase / tan(most steering)")
     low, high = np.array([-back, -side, -turn]), np.array([speed, side, turn])
-    made = BaseLimits(kind, low, high, np.array([*acceleration[:1], *acceleration]), discs, turning_radius)
+    faster, sooner = acceleration or ((0.6, 1.5) if kind in (BaseKind.HUMANOID, BaseKind.QUADRUPED) else (1.0, 3.0))
+    made = BaseLimits(kind, low, high, np.array([faster, faster, sooner]), discs, turning_radius)
     made.check()
     return made
 
