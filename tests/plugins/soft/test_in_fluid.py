@@ -70,7 +70,7 @@ def test_it_goes_on_from_a_snapshot_in_the_middle_of_a_splash() -> None:
     with begun(run, num_envs=2) as (env, it):
         wait(env, 4)
         assert isinstance(it, Inflatable)
-        assert it.wet.any()
+        assert it.due.any()
         snapshot = env.snapshot()
         wait(env, 3)
         expected = [x[:1].tobytes() for x in env.families.snapshot(np.arange(2)).values()]
