@@ -21,6 +21,7 @@ FURTHER = 4.0
 """[m] that ways are longer than."""
 HARD = 20.0
 """[N] a contact with something in the room that is harder is a failure."""
+HIT = {"term": "force_over", "limit": HARD, "steps": 1}
 LATE = 90.0
 """[s]"""
 CONTROL_DT = 0.02
@@ -125,7 +126,7 @@ def drive(
         task["world"]["families"] = _people(people, walks, start, np.random.default_rng([seed, 2]))
         for name in task["world"]["families"]:
             task["world"]["contact_sensors"][f"met_{name}"] = {"body": name, "against": "base"}
-            task["task"]["failure"][f"met_{name}"] = {"term": "force_over", "sensor": f"met_{name}", "limit": HARD}
+            task["task"]["failure"][f"met_{name}"] = {**HIT, "sensor": f"met_{name}"}
     with make(task, engine=engine, num_envs=1) as env:
         return _driven(env, seed, length)
 
@@ -182,9 +183,8 @@ def _task(
     facing: dict[str, Any] = {}
     if how.facing is not None:
         facing = {"facing": {"term": "aligned", "a": "base", "b": "goal", "tolerance": how.facing}}
-    fell: dict[str, Any] = {}
-    if how.tilts:
-        fell = {"fell": {"term": "not", "of": {"upright": {"frame": "base", "tolerance": 0.6}}}}
+    upright = {"upright": {"frame": "base", "tolerance": 0.6}}
+    fell = {"fell": {"term": "not", "of": upright}} if how.tilts else {}
     skill = {"skill": "navigate", "robot": "base", "goal": "goal", "planner": planner, "steps": int(LATE / CONTROL_DT)}
     return {
         "physics": {"dt": 0.002, "control_dt": CONTROL_DT},
@@ -211,8 +211,7 @@ def _task(
                 "still": {"term": "still", "frame": "base", "speed": how.still[0], "rate": how.still[1]},
                 **facing,
             },
-            "failure": {f"hit_{name}": {"term": "force_over", "sensor": f"hit_{name}", "limit": HARD} for name in names}
-            | fell,
+            "failure": {f"hit_{name}": {**HIT, "sensor": f"hit_{name}"} for name in names} | fell,
             "expert": skill | how.skill,
         },
         "record": {"cameras": []},
