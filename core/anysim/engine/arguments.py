@@ -25,12 +25,13 @@ def indices(values: ArrayLike, size: int, kind: str) -> Array:
     if array.dtype.kind == "b" or (array.size and array.dtype.kind not in "iu"):
         raise EngineError(f"{kind} indices must be integers, got {array.dtype} (for a mask pass np.flatnonzero(mask))")
     array = array.astype(np.int64).reshape(-1)
-    listed = array.tolist()  # most have a few numbers, which numpy would take longer for
-    if listed and (min(listed) < 0 or max(listed) >= size):
-        bad = next(index for index in listed if not 0 <= index < size)
-        raise EngineError(f"{kind} index {bad} is out of range; there are {size}")
-    if len(set(listed)) != len(listed):
-        raise EngineError(f"{kind} indices repeat: {listed}")
+    rising = array.size < 2 or bool((array[1:] > array[:-1]).all())  # as most do: then their ends are the extremes
+    if array.size and (min(array[0], array[-1]) < 0 or max(array[0], array[-1]) >= size or not rising):
+        bad = array[(array < 0) | (array >= size)]
+        if bad.size:
+            raise EngineError(f"{kind} index {int(bad[0])} is out of range; there are {size}")
+    if not rising and len(set(array.tolist())) != len(array):
+        raise EngineError(f"{kind} indices repeat: {array.tolist()}")
     return array
 
 

@@ -12,7 +12,7 @@ from anysim_soft.flex_xml import contact_of, numbers
 from anysim_soft.shell_matter import ShellMatter
 from anysim_soft.spec import DeformableSpec, SoftSpec
 from anysim_soft.subworld import FlexSource
-from anysim_soft.surfaces import Surface
+from anysim_soft.surfaces import Surface, point_areas
 
 SKIN = 0.001
 """[m] from the surface at which contacts act."""
@@ -33,13 +33,9 @@ class Deformable(ShellMatter):
         super().__init__(setting)
         assert isinstance(setting.spec, DeformableSpec)
         counts = np.array(setting.spec.points)
-        rest, faces = _lattice(np.array(setting.spec.box), counts), self.faces
-        corner = rest[faces]
-        share = np.zeros(len(rest))
-        area = P.norm(P.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
-        np.add.at(share, faces, area[:, None])
-        own = share[self.shell] / share.sum()
-        self._surface = Surface(rest[self.shell], np.searchsorted(self.shell, faces), own, SKIN, 0.0)
+        rest, faces = _lattice(np.array(setting.spec.box), counts)[self.shell], np.searchsorted(self.shell, self.faces)
+        areas = point_areas(rest, faces)
+        self._surface = Surface(rest, faces, areas / areas.sum(), SKIN, 0.0)
         self._shares = _shares(counts, np.array(setting.spec.cells))[self.shell].T
 
     @classmethod

@@ -203,7 +203,8 @@ class Soft(CoSolver):
         """The model of an env: all that it is made of is in the memory, and it is made anew when that has changed."""
         parts = (self.values, self.frame, self.anchors, self._mass, self._com, self._inertia)
         surfaces = [one.surface(env) for one in self.under]
-        key = b"".join([*(part[env].tobytes() for part in parts), *(one.mass.tobytes() for one in surfaces)])
+        drawn = [np.append(one.mass, one.friction) for one in surfaces]
+        key = b"".join([*(part[env].tobytes() for part in parts), *(one.tobytes() for one in drawn)])
         made = self._worlds.get(env)
         if made is None or made[0] != key:
             mass = np.where(self._held, np.inf, self._mass[env] * self._heavier)

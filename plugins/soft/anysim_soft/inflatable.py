@@ -20,6 +20,7 @@ from anysim_soft.flex_xml import contact_of, numbers
 from anysim_soft.shell_matter import ShellMatter
 from anysim_soft.spec import InflatableSpec, SoftSpec
 from anysim_soft.subworld import FlexSource
+from anysim_soft.surfaces import point_areas
 
 AIR = 101_325.0
 """[Pa] around it."""
@@ -62,10 +63,7 @@ class Inflatable(ShellMatter):
     def source(self, values: Mapping[str, float], pose: Array) -> FlexSource:
         spec, points, faces = self._spec, self._spec.radius * self._points, self._faces
         young, poisson, thickness = values["young"], values["poisson"], values["thickness"]
-        corner = points[faces]
-        area = P.norm(P.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])) / 2
-        mass = np.zeros(len(points))
-        np.add.at(mass, faces, values["density"] * thickness * area[:, None] / 3)
+        mass = values["density"] * thickness * point_areas(points, faces)
         middle = pose[:3] + np.array([0.0, 0.0, spec.radius])
         words = {
             "point": numbers(points.ravel()),

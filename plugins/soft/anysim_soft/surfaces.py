@@ -11,10 +11,17 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim_soft.flex_xml import numbers
 
 NAME = "surface "
 """Of their flexes, before the number."""
+
+
+def point_areas(points: Array, faces: Array) -> Array:
+    """(V,) [m^2] of a surface of triangles (F, 3) that each of its points (V, 3) [m] stands for."""
+    a, b = (points[faces[:, i]] - points[faces[:, 0]] for i in (1, 2))
+    return np.bincount(faces.ravel(), np.repeat(P.norm(P.cross(a, b)) / 6, 3), len(points))
 
 
 class Surface(NamedTuple):

@@ -132,3 +132,17 @@ def test_a_towel_on_a_block_goes_on_from_a_snapshot_and_alone_to_the_bit():
         for _ in range(5):
             env.step(np.zeros((2, 0)))
         assert np.array_equal(it.x[0], expected[0][0])
+
+
+def test_the_friction_of_a_block_is_that_of_the_episode():
+    run = run_of(LAID["towel"], "mujoco", {})
+    run["world"]["families"]["block"] = {**BLOCK, "friction": {"range": [0.1, 2.0]}}
+    with begun(run) as (env, it):
+        seen = set()
+        for seed in range(3):
+            env.reset(seed=seed)
+            env.step(np.zeros((1, 0)))
+            drawn = env.families.family("block").parameter("friction", 0)
+            assert it.sub_world(0).model.flex_friction[1, 0] == drawn
+            seen.add(drawn)
+        assert len(seen) == 3
