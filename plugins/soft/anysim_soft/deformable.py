@@ -71,12 +71,7 @@ class Deformable(ShellMatter):
             f"{contact_of(values['friction'], self._step)}</flexcomp>"
         )
         sides = {side: on_side(nodes, box, side) for side in spec.attached}
-
-        def press(env: int, x: Array, v: Array) -> Array:
-            del x, v
-            return self._shares @ self.pushed(env)
-
-        return FlexSource(xml, fixed, np.zeros(0), OPTIONS, sides, inner=press)
+        return FlexSource(xml, fixed, np.zeros(0), OPTIONS, sides)
 
     # ------------------------------------------------------------------ what lies on it
 
@@ -90,6 +85,9 @@ class Deformable(ShellMatter):
         return self._surface._replace(
             mass=self.mass(env) * self._surface.mass, friction=self.parameter("friction", env)
         )
+
+    def on_nodes(self, forces: Array) -> Array:
+        return self._shares @ forces
 
     def moving(self, env: int) -> tuple[Array, Array]:
         """(S, 3) [m], [m/s] the points of that surface now."""

@@ -69,6 +69,10 @@ class Soft(CoSolver):
     def after_solve(self, env: int, sub: SubWorld) -> None:
         """The solver of an env has moved on."""
 
+    def push_on_nodes(self, env: int) -> Array | None:
+        """(V, 3) [N] what other matter does to its nodes in a step; None where there is nothing."""
+        del env
+
     @property
     @abstractmethod
     def radius(self) -> float:
@@ -241,7 +245,7 @@ class Soft(CoSolver):
                 shut, openings = self.pads.shut(joint_pos[row]), self.pads.openings(joint_pos[row])
                 sub.jaws.drive(sub.data, openings, shut, bodies.friction[row], duration)
             sub.surfaces.put(sub.data, [one.moving(env) for one in self.under])
-            done = sub.step(self.soft.substeps, self.parameter("drag", env), env)
+            done = sub.step(self.soft.substeps, self.parameter("drag", env), env, self.push_on_nodes(env))
             if len(self.pads):
                 self.pads.felt(env, sub.pulls())
             for other, pushed in zip(self.under, sub.surfaces.impulses, strict=True):

@@ -93,7 +93,7 @@ class Inflatable(ShellMatter):
             due = self.gas[env] / now - absolute - absolute / now * swells * h
             self.pressure[env] += share * due
             acts = self.pressure[env] - DAMPED * h / yields * swells
-            return acts * slope + self.pushed(env)
+            return acts * slope
 
         return FlexSource(xml, np.zeros(len(points), dtype=bool), mass, solver_of(len(points)), {}, adjust, inner=press)
 

@@ -33,9 +33,13 @@ class ShellMatter(Soft):
         if not self.pinned:
             self.received[env] += about_origin(impulse, self.x[env, self.shell])
 
-    def pushed(self, env: int) -> Array:
-        """(S, 3) [N] on these points in a step of its solver."""
-        return self.due[env] / (self._step * self.soft.substeps)
+    def push_on_nodes(self, env: int) -> Array | None:
+        due = self.due[env]
+        return self.on_nodes(due / (self._step * self.soft.substeps)) if due.any() else None
+
+    def on_nodes(self, forces: Array) -> Array:
+        """(V, 3) [N] on its nodes, of forces (S, 3) on these points: they are one and the same."""
+        return forces
 
     def after_solve(self, env: int, sub: SubWorld) -> None:
         self.due[env] = 0.0

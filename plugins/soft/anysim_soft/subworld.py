@@ -151,7 +151,8 @@ class SubWorld:
         self.data = mujoco.MjData(model)
         self.held = ~np.isfinite(bodies.mass)
         self.nodes = np.array(_nodes(model), dtype=np.intp)
-        self._moving = self.nodes[model.body_dofnum[self.nodes] > 0]
+        self._movable = model.body_dofnum[self.nodes] > 0
+        self._moving = self.nodes[self._movable]
         self._dofs = model.body_dofadr[self._moving][:, None] + np.arange(3)
         self.mass = np.array(model.body_mass[self._moving])
         self._axis = np.full(model.nv, -1)
@@ -180,10 +181,9 @@ class SubWorld:
         if openings is not None:
             self.jaws.begin(self.data, openings)
         if self.source.start is not None:
-            moving = self.model.body_dofnum[self.nodes] > 0
             first = self.model.jnt_qposadr[self.model.body_jntadr[self._moving]]
             flat = self.model.body_pos[self._moving]
-            self.data.qpos[first[:, None] + np.arange(3)] = self.source.start[moving] - flat
+            self.data.qpos[first[:, None] + np.arange(3)] = self.source.start[self._movable] - flat
         return self.state()
 
     def state(self) -> Array:
@@ -259,11 +259,15 @@ class SubWorld:
         found[place[data.efc_id[rows[::3]]]] = data.efc_force[rows].reshape(-1, 3)
         return found
 
-    def step(self, substeps: int, drag: float, env: int = 0) -> Exchange:
-        """Move on by `substeps` steps from a state that was taken up; `env` is what its inner forces are told."""
+    def step(self, substeps: int, drag: float, env: int = 0, push: Array | None = None) -> Exchange:
+        """Move on by `substeps` steps from a state that was taken up; `env` is what its inner forces are told.
+
+        `push` (V, 3) [N] is what other matter does to its nodes.
+        """
         model, data, h = self.model, self.data, self.model.opt.timestep
         done = Exchange(np.zeros((len(self._pose), 6)), np.zeros(6))
-        slower, inner, outer = (1.0 - math.exp(-drag * h)) / h, self._no_inner, self._outer
+        slower, outer = (1.0 - math.exp(-drag * h)) / h, self._outer
+        pushed = inner = self._no_inner if push is None else push[self._movable]
         points, bodies, frames = (
             (self._moving, self._dofs),
             (self._proxies, self._twist),
@@ -273,7 +277,7 @@ class SubWorld:
             mujoco.mj_step1(model, data)  # works out where everything is
             before = self.momentum() if self._pinned else None
             if self.source.inner is not None:
-                inner = self._inner(env)
+                inner = pushed + self._inner(env)
             kernels.load(data.qvel, self.mass, self._dofs, self.gravity, slower, inner, data.qfrc_applied, outer)
             if self._uneven:
                 self._even_contacts()
@@ -290,7 +294,7 @@ class SubWorld:
     def _inner(self, env: int) -> Array:
         """(M, 3) [N] of the points on each other, those that move."""
         assert self.source.inner is not None
-        velocity, moving = np.zeros((len(self.nodes), 3)), self.model.body_dofnum[self.nodes] > 0
+        velocity, moving = np.zeros((len(self.nodes), 3)), self._movable
         velocity[moving] = self.data.qvel[self._dofs]
         return self.source.inner(env, self.data.xpos[self.nodes], velocity)[moving]
 
