@@ -28,7 +28,8 @@ class MetBodies:
         frame: (n, K, 7) of the bodies.
         frame_twist: (n, K, 6) [m/s, rad/s] velocity of the frame's origin, and rate.
         local: (n, K, 3) [m] their centres of mass in these frames.
-        weighed: (n, K) [kg] as if all were there; inf of what joints hold.
+        weighed: (n, K) [kg] as if all were there and free.
+        held: (K,) bool, what joints hold.
         moments: (n, K, 6) [kg m^2] xx, yy, zz, xy, xz, yz about the centre of mass, in the axes of the body.
         friction: (n, G) of the World's geoms.
         there: (n, E) bool, the World's entities that are there.
@@ -40,6 +41,7 @@ class MetBodies:
     frame_twist: Array
     local: Array
     weighed: Array
+    held: Array
     moments: Array
     friction: Array
     there: Array
@@ -69,7 +71,7 @@ class MetBodies:
     @cached_property
     def mass(self) -> Array:
         """(n, K) [kg], 0 of what is not there; inf of what joints hold, which moves as it does, whatever it meets."""
-        return np.where(self.there[:, self.entity], self.weighed, 0.0)
+        return np.where(self.there[:, self.entity], np.where(self.held, np.inf, self.weighed), 0.0)
 
     @property
     def inertia(self) -> Array:
@@ -172,7 +174,8 @@ class CoSolver(Family):
             pose[:, met],
             twist[:, met],
             self._com[rows],
-            np.where(self._held, np.inf, self._mass[rows]),
+            self._mass[rows],
+            self._held,
             self._inertia[rows],
             self._friction[rows],
             self.engine.presence[rows] if there is None else there[rows],
