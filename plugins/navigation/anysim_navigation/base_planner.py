@@ -10,7 +10,7 @@ from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
-from anysim_navigation.limits import OUTPUTS, BaseKind, BaseLimits, kind_of, limits_of, output_of
+from anysim_navigation.limits import OUTPUTS, SWAY, BaseKind, BaseLimits, kind_of, limits_of, output_of
 from anysim_navigation.movers import movers_of
 from anysim_navigation.progress import PATIENCE, RECOVERY
 from anysim_navigation.robot_shape import discs_of
@@ -79,7 +79,7 @@ class PlannedBase(Base):
         car = vehicle if isinstance(vehicle, AckermannSpec) else None  # which may be steered by its rate of turning
         kind = BaseKind.ACKERMANN if car else kind_of(self._labels, 0 if entry is None else len(entry.legs))
         shape = self.env.engine.world, self._robot.name, frame_pose(self.env.scene, self.frame)
-        discs = discs_of(*shape, 2 if car else 1)  # who cannot turn on the spot needs no room to
+        discs = discs_of(*shape, 2 if car else 1, SWAY.get(kind, 0.0))  # who cannot turn on the spot needs no room to
         most, least = np.array(controller.high, dtype=float), np.array(controller.low, dtype=float)
         options: dict[str, Any] = {}
         if car:

@@ -57,11 +57,6 @@ class Driving(NamedTuple):
     still: tuple[float, float] = (0.05, 0.1)
     tilts: bool = False
 
-    @property
-    def speed(self) -> float:
-        """[m/s] at which it goes at most."""
-        return float(self.skill.get("speed", 0.6))
-
 
 _ON_LEGS: dict[str, Any] = {"close": 0.25, "facing": 0.3, "still": (0.15, 0.6), "tilts": True}
 BASES: dict[str, Driving] = {

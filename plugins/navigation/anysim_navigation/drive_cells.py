@@ -61,7 +61,7 @@ class DriveStore:
 def figures(cell: Cell, drives: list[Drive]) -> dict[str, Any]:
     """What the drives of a cell come to, as plain data."""
     solved = [one for one in drives if one.ended == "success"]
-    pace = BASES.get(cell.robot, Driving()).speed
+    pace = BASES.get(cell.robot, Driving()).skill.get("speed", 0.6)
     met = [one.met for one in drives if one.met]
     return {
         **cell._asdict(),

@@ -38,6 +38,12 @@ SAMPLES: dict[BaseKind, tuple[int, int, int]] = {
 """Velocities forward, to the left and turning that are tried of each kind."""
 
 
+SWAY = {BaseKind.HUMANOID: 0.075}
+"""[m] to both sides of who walks, 0.073 m of the G1 at all its velocities; that of a moment says nothing of its way."""
+ACCELERATIONS = {BaseKind.HUMANOID: (0.25, 0.4), BaseKind.QUADRUPED: (0.6, 1.5)}
+"""[m/s^2], [rad/s^2] of legs, which follow with their next step: who is to turn about within a stride may fall."""
+
+
 class BaseLimits(NamedTuple):
     """What a base can do, and the room that it takes.
 
@@ -58,8 +64,8 @@ class BaseLimits(NamedTuple):
 
     @property
     def radius(self) -> float:
-        """[m] of the largest disc, by which ways keep clear of things."""
-        return float(self.discs[:, 2].max())
+        """[m] that it takes to either side of its way, by which ways keep clear of things."""
+        return float((np.abs(self.discs[:, 1]) + self.discs[:, 2]).max())
 
     def check(self) -> None:
         """Look for what no planning is possible with.
@@ -96,7 +102,7 @@ def limits_of(
         speed, turn: forward [m/s], and turning [rad/s].
         side: [m/s] to both sides; as forward for what is holonomic, a third of it on legs, else none.
         back: [m/s] backwards; as forward for what is holonomic, else half of it.
-        acceleration: [m/s^2], [rad/s^2]; (1, 3), on legs (0.6, 1.5): who is to turn about within a stride may fall.
+        acceleration: [m/s^2], [rad/s^2]; (1, 3), on legs `ACCELERATIONS`.
         turning_radius: [m] of a car.
     """
     if kind in (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN):
@@ -108,7 +114,7 @@ def limits_of(
     if kind is BaseKind.ACKERMANN and turning_radius <= 0:
         raise AnysimError("a car has a turning_radius above 0 [m]: wheelbase / tan(most steering)")
     low, high = np.array([-back, -side, -turn]), np.array([speed, side, turn])
-    faster, sooner = acceleration or ((0.6, 1.5) if kind in (BaseKind.HUMANOID, BaseKind.QUADRUPED) else (1.0, 3.0))
+    faster, sooner = acceleration or ACCELERATIONS.get(kind, (1.0, 3.0))
     made = BaseLimits(kind, low, high, np.array([faster, faster, sooner]), discs, turning_radius)
     made.check()
     return made

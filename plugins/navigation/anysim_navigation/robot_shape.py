@@ -18,14 +18,14 @@ OVER = 0.05
 LEAST_HEIGHT = 0.3
 
 
-def discs_of(world: World, robot: str, frame_pose: Array, least: int = 1) -> Array:
-    """(D, 3) discs that cover the outline of a robot as it begins, in its frame, which is at a pose (7,) then."""
+def discs_of(world: World, robot: str, frame_pose: Array, least: int = 1, sway: float = 0.0) -> Array:
+    """(D, 3) discs over a robot as it begins, its frame at a pose (7,), in that frame, and `sway` [m] to its sides."""
     outlines = np.concatenate(_outlines(world, robot))
     off = np.concatenate([outlines - frame_pose[:2], np.zeros((len(outlines), 1))], axis=1)
     half = 0.5 * P.yaw(frame_pose[3:])
     level = np.array([0.0, 0.0, np.sin(half), np.cos(half)])
     local = P.rotate_inverse(np.tile(level, (len(off), 1)), off)[:, :2]
-    return discs_over(local.min(axis=0), local.max(axis=0), least)
+    return discs_over(*(local.min(axis=0), local.max(axis=0)) + sway * np.array([[0.0, -1.0], [0.0, 1.0]]), least)
 
 
 def agent_of(world: World, robot: str, limits: BaseLimits) -> Agent:

@@ -18,7 +18,7 @@ from anysim.task.scene import Frame, RobotView, SceneView
 from anysim_navigation.agent import NoRoute
 from anysim_navigation.car_ways import car_way
 from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
-from anysim_navigation.limits import BaseKind, BaseLimits
+from anysim_navigation.limits import SWAY, BaseKind, BaseLimits
 from anysim_navigation.maps import NavMaps
 from anysim_navigation.movers import Movers
 from anysim_navigation.navmesh import NavMesh, length_of
@@ -173,7 +173,7 @@ class BaseRouter:
         rows, envs = rows[going], envs[going]
         posed = GeomPoses(*(array[rows] for array in self._eye.posed))
         cells = occupancy(self._eye.geometry, posed, self._eye.poses[rows], self._grid, seen=self._seen)
-        twist = in_base(self._frame.twist[rows], pose[rows])
+        twist = self.twist[envs] if self.limits.kind in SWAY else in_base(self._frame.twist[rows], pose[rows])
         movers = self._movers.around(rows, pose[rows])
         for k, env in enumerate(envs.tolist()):
             self._steer(env, pose[rows[k]], distances_of(cells[k], self._grid.cell), twist[k], movers[k])

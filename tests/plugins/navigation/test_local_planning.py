@@ -5,12 +5,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from anysim.api import compile_world
 from anysim.conventions import Array
 from anysim.errors import AnysimError
 from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
-from anysim_navigation.limits import BaseKind, BaseLimits, discs_over, kind_of, limits_of, output_of
+from anysim_navigation.limits import SWAY, BaseKind, BaseLimits, discs_over, kind_of, limits_of, output_of
 from anysim_navigation.pose_control import PoseControl, in_frame
 from anysim_navigation.progress import OFF, PATIENCE, RECOVERY, Progress
+from anysim_navigation.robot_shape import discs_of
 from anysim_navigation.router import ROOM
 
 CELL, SIDE = 0.05, 120
@@ -262,3 +264,20 @@ def test_discs_cover_a_rectangle(size: tuple[float, float]) -> None:
     points = np.random.default_rng(0).uniform(low, high, (500, 2))
     off = np.hypot(points[:, None, 0] - discs[:, 0], points[:, None, 1] - discs[:, 1])
     assert (off <= discs[:, 2] + 1e-9).any(axis=1).all()
+
+
+def test_who_is_wider_than_deep_keeps_its_width_from_things() -> None:
+    """Discs beside each other are narrow, but the base that they cover is not."""
+    wide = limits_of(BaseKind.HUMANOID, discs_over(np.array([-0.1, -0.3]), np.array([0.1, 0.3])), speed=0.25, turn=0.3)
+    assert wide.radius >= 0.3
+    assert wide.discs[:, 2].max() < 0.2
+    long = limits_of(BaseKind.QUADRUPED, discs_over(np.array([-0.3, -0.1]), np.array([0.3, 0.1])), speed=0.5, turn=0.8)
+    assert long.radius == pytest.approx(long.discs[:, 2].max())
+
+
+def test_a_walk_takes_its_sway_as_well() -> None:
+    world = compile_world({"world": {"robots": {"g1": {"robot": "unitree_g1"}}}})
+    at = world.initial_body_pose[world.entities[world.entity_numbers["g1"]].root]
+    wide = [discs_of(world, "g1", at, sway=sway) for sway in (0.0, SWAY[BaseKind.HUMANOID])]
+    narrow, swaying = (float((np.abs(discs[:, 1]) + discs[:, 2]).max()) for discs in wide)
+    assert swaying - narrow > 0.9 * SWAY[BaseKind.HUMANOID]

@@ -35,6 +35,15 @@ def test_it_gets_through_on_the_other_engines(base: str, engine: str) -> None:
     assert (found.ended, found.hardest < HARD) == ("success", True)
 
 
+@pytest.mark.full
+@pytest.mark.parametrize("room", [3, 4, 5])  # where it ran into things before its sway was known
+def test_a_humanoid_gets_through(room: int) -> None:
+    require_engine("mujoco")
+    found = drive(room, "unitree_g1", "mujoco")
+    assert found is not None
+    assert (found.ended, found.hardest < HARD) == ("success", True)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("base", "room"),
