@@ -25,7 +25,8 @@ def discs_of(world: World, robot: str, frame_pose: Array, least: int = 1, sway: 
     half = 0.5 * P.yaw(frame_pose[3:])
     level = np.array([0.0, 0.0, np.sin(half), np.cos(half)])
     local = P.rotate_inverse(np.tile(level, (len(off), 1)), off)[:, :2]
-    return discs_over(*(local.min(axis=0), local.max(axis=0)) + sway * np.array([[0.0, -1.0], [0.0, 1.0]]), least)
+    aside = np.array([0.0, sway])
+    return discs_over(local.min(axis=0) - aside, local.max(axis=0) + aside, least)
 
 
 def agent_of(world: World, robot: str, limits: BaseLimits) -> Agent:
@@ -41,5 +42,4 @@ def _outlines(world: World, robot: str) -> list[Array]:
     entity = world.entities[world.entity_numbers[robot]]
     own = range(entity.body_start, entity.body_stop)
     others = set(range(len(world.bodies))) - set(own)
-    found = footprints(world, world.initial_body_pose, (STEP, inf), {-1, *others})
-    return found
+    return footprints(world, world.initial_body_pose, (STEP, inf), {-1, *others})
