@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis import HealthCheck, settings
 
+from anysim import threads as shared_threads
+
 if TYPE_CHECKING:
     from typer import Typer
 
@@ -136,7 +138,8 @@ def _listing() -> frozenset[str]:
 def _nothing_runs_on() -> Iterator[None]:
     """At the end of the session no thread and no worker process of a test is alive."""
     yield
-    threads = [t.name for t in threading.enumerate() if t is not threading.main_thread() and not t.daemon]
+    kept = ("MainThread", shared_threads.NAME)
+    threads = [t.name for t in threading.enumerate() if not (t.daemon or t.name.startswith(kept))]
     processes = [f"{p.name} ({p.pid})" for p in multiprocessing.active_children()]
     assert not threads, f"threads that no test stopped: {', '.join(threads)}"
     assert not processes, f"processes that no test stopped: {', '.join(processes)}"

@@ -1,11 +1,11 @@
 """Options of MuJoCo that mean nothing to another engine."""
 
-import os
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from anysim.engine.options import EngineOptions
+from anysim.threads import usable_cores
 
 SAMPLES = 4
 """Of each pixel, by default, where a graphics card draws."""
@@ -52,8 +52,7 @@ class MujocoOptions(EngineOptions):
 
     def thread_count(self, num_envs: int) -> int:
         """The threads to use for `num_envs` envs."""
-        cpus = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        return self.threads or max(1, min(num_envs, cpus))
+        return self.threads or max(1, min(num_envs, usable_cores()))
 
     def samples(self, in_software: bool) -> int:
         """The samples per pixel to draw with."""

@@ -1,6 +1,5 @@
 """Executors: where the envs of an engine are stepped, if not in this process (the kind `anysim.executors`)."""
 
-import os
 from abc import ABC, abstractmethod
 from contextlib import AbstractContextManager, nullcontext
 from typing import Literal
@@ -8,6 +7,7 @@ from typing import Literal
 from anysim import registry
 from anysim.engine.base import SimEngine
 from anysim.errors import PluginError
+from anysim.threads import usable_cores
 
 PROCESSES = "processes"
 """The executor that `shards` asks for."""
@@ -45,11 +45,6 @@ def executor(name: str = PROCESSES) -> Executor:
         package = registry.distribution("executors", name)
         raise PluginError(f"the executor '{name}' of {package} is no subclass of anysim.engine.executor.Executor")
     return found()
-
-
-def usable_cores() -> int:
-    """The cores that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def shard_count(shards: int | Literal["auto"], engine_class: type[SimEngine], num_envs: int | None = None) -> int:

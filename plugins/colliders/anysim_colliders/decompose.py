@@ -20,6 +20,7 @@ from anysim.errors import AssetError
 from anysim.geometry.triangles import convex_hull
 from anysim.kinematics import inertia
 from anysim.model.world import Mesh, MeshShape
+from anysim.threads import usable_cores
 from anysim_colliders import coacd_child
 from anysim_colliders.replacing import Collider, Substitute, replaced, volume_words
 from anysim_schemas.collision_shapes import CollisionShapesSpec
@@ -65,7 +66,7 @@ def pieces(mesh: Mesh, concavity: float, most: int, *, threads: int | None = Non
 
     def make() -> dict[str, Array]:
         arrays: dict[str, Array] = {}
-        for i, corners in enumerate(_corners(mesh, concavity, most, threads or _allowed())):
+        for i, corners in enumerate(_corners(mesh, concavity, most, threads or usable_cores())):
             arrays[f"{i}/vertices"], arrays[f"{i}/faces"] = convex_hull(corners, HULL_VERTICES)
         return arrays
 
@@ -79,10 +80,6 @@ def _mesh(name: str, key: str, arrays: dict[str, Array], number: int) -> Mesh:
     vertices.setflags(write=False)
     faces.setflags(write=False)
     return Mesh(f"{name}_{number}", vertices, faces, key)
-
-
-def _allowed() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _corners(mesh: Mesh, concavity: float, most: int, threads: int) -> list[Array]:

@@ -1,9 +1,7 @@
 """Particle matter as a family: what fluid and grains have in common."""
 
-import os
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +15,7 @@ from anysim.families.cosolver import CoSolver, MetBodies, about_origin
 from anysim.math import pose as P
 from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
+from anysim.threads import shared
 from anysim_particles import skins
 from anysim_particles.spec import MOST, MatterSpec
 from anysim_schemas.base import Spec
@@ -95,7 +94,6 @@ class Particles(CoSolver):
         self._falls = np.array([*floats, False], dtype=bool)
         self._gravity = np.array(world.physics.gravity, dtype=float)
         self._skinned: Sequence[skins.Skinned] = ()
-        self._threads = max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
 
     def joined(self, families: Sequence[Family]) -> None:
         if self.meets_skins:
@@ -189,14 +187,7 @@ class Particles(CoSolver):
             )
             self.step_env(env, proxies, duration)
 
-        threads = min(self._threads, n)
-        if threads > 1:
-            # a pool a call, so that there is nothing to close and nothing that a fork could lose
-            with ThreadPoolExecutor(threads, "particles") as pool:
-                list(pool.map(one, range(n)))
-        else:
-            for row in range(n):
-                one(row)
+        shared(one, range(n))
         if others:
             self._splash(env_ids, others, tables, impulse[:, met:size, :3])
         return np.ascontiguousarray(impulse[:, :met])

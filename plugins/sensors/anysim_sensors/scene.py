@@ -4,8 +4,7 @@ It knows the neutral model and poses, and no engine: equal poses give equal read
 other, so that an env's bits do not depend on the others, or on how many threads share them.
 """
 
-from collections.abc import Callable, Collection
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Collection
 from math import inf
 from typing import Any, Literal, NamedTuple
 
@@ -17,6 +16,7 @@ from anysim.errors import AnysimError
 from anysim.math import pose as P
 from anysim.model.frames import FixedFrame
 from anysim.model.world import World
+from anysim.threads import shared
 from anysim_sensors.compile import geom_tables
 from anysim_sensors.tables import GeomPoses
 
@@ -200,7 +200,8 @@ class SceneGeometry:
                 *(array[part] for array in answers),
             )
 
-        in_blocks(block, envs, threads)
+        size = -(-envs // threads)
+        shared(block, [slice(i, i + size) for i in range(0, envs, size)], threads)
         return answers
 
 
@@ -214,14 +215,6 @@ def mounted(body_pose: Array, mount: FixedFrame) -> Array:
     if mount.body < 0:
         return np.repeat(local[None], len(body_pose), axis=0)
     return P.compose(body_pose[:, mount.body], local)
-
-
-def in_blocks(work: Callable[[slice], None], envs: int, threads: int) -> None:
-    """Call `work(part)` for slices of the envs, shared by threads."""
-    size = -(-envs // threads)
-    # a pool a call, so that there is nothing to close and nothing that a fork could lose
-    with ThreadPoolExecutor(threads, "sensors") as pool:
-        list(pool.map(work, [slice(i, i + size) for i in range(0, envs, size)]))
 
 
 def _sets(values: Array, envs: int) -> Array:

@@ -19,10 +19,10 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.control import Control
-from anysim.engine.executor import usable_cores
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.errors import EngineError, EngineFailure
 from anysim.model.world import World
+from anysim.threads import usable_cores
 from anysim_processes.shared_memory import SharedArrays
 from anysim_processes.worker_handle import WorkerLost
 from anysim_sharded.blocks import Blocks, joined, joined_by_name, joined_contacts, rows_of, state_layout

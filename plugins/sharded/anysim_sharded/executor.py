@@ -5,7 +5,8 @@ from contextlib import AbstractContextManager
 from typing import TypeVar, TypeVarTuple
 
 from anysim.engine.base import SimEngine
-from anysim.engine.executor import Executor, usable_cores
+from anysim.engine.executor import Executor
+from anysim.threads import usable_cores
 from anysim_processes.executors import JobExecutor
 from anysim_processes.jobs import treat_all
 from anysim_sharded.engine import TIMEOUT_S, sharded

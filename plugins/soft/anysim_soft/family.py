@@ -1,9 +1,7 @@
 """Soft matter as a family: what blocks, ropes and cloth have in common."""
 
-import os
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +15,7 @@ from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
 from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
+from anysim.threads import shared
 from anysim_schemas.base import Spec
 from anysim_soft.pads import Pads
 from anysim_soft.spec import MOST, PadSpec, SoftSpec
@@ -105,7 +104,6 @@ class Soft(CoSolver):
         self._late = self._held | (self._heavier > 1.0)
         self._gravity = np.array(world.physics.gravity, dtype=float)
         self._step = world.physics.dt / self.soft.substeps
-        self._threads = max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
         self._worlds: dict[int, tuple[bytes, SubWorld]] = {}
         self.under: Sequence[Surfaced] = ()
         self.values = self.remember("values", len(self.drawn_keys))
@@ -264,14 +262,7 @@ class Soft(CoSolver):
             impulse[row] = np.where(self._late[:, None], SHARE * due, due)
             self.pending[env] = due - impulse[row]
 
-        threads = min(self._threads, len(env_ids))
-        if threads > 1:
-            # a pool a call, so that there is nothing to close and nothing that a fork could lose
-            with ThreadPoolExecutor(threads, "soft") as pool:
-                list(pool.map(one, range(len(env_ids))))
-        else:
-            for row in range(len(env_ids)):
-                one(row)
+        shared(one, range(len(env_ids)))
         return impulse
 
     def momentum(self, env_ids: Array) -> Array:

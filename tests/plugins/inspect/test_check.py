@@ -12,6 +12,7 @@ from anysim.cli.main import app
 from anysim.errors import listing
 from anysim_inspect.cli.check import report_on
 
+pytestmark = pytest.mark.usefixtures("command_line")
 BROKEN = Path(__file__).parent / "broken"
 FILES = sorted(BROKEN.glob("*.yaml"))
 

@@ -1,14 +1,12 @@
 """Batched inverse kinematics on the kernels: `NumbaIk`, the planner `numba_ik`."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError
 from anysim.kinematics.chain import Chain
 from anysim.planning.api import IkRequest, IkResult, IkStep, InverseKinematics
+from anysim.threads import shared, usable_cores
 from anysim_control.batch.frames import LENGTH_PER_REACH, canonical_frames
 
 BLOCK = 64
@@ -64,7 +62,7 @@ class NumbaIk(InverseKinematics):
         self._frames = canonical_frames(chain)
         self._length = LENGTH_PER_REACH * (np.sqrt((self._frames[:, :, 3] ** 2).sum(axis=1)).sum() or 1.0)
         self._spread = np.where(chain.prismatic, 1.0, np.pi)  # random starts of joints without limits
-        self._threads = threads or _cores()
+        self._threads = threads or usable_cores()
         self._warm_up()
 
     def _solve(self, request: IkRequest, random_restarts: int, rng_seeds: Array) -> IkResult:
@@ -96,9 +94,7 @@ class NumbaIk(InverseKinematics):
         if self._threads == 1 or rows < SHARED_FROM:
             block(slice(0, rows))
         else:
-            # A pool a call, so that there is nothing to close and nothing that a fork could lose.
-            with ThreadPoolExecutor(self._threads, "numba_ik") as pool:
-                list(pool.map(block, [slice(i, i + BLOCK) for i in range(0, rows, BLOCK)]))
+            shared(block, [slice(i, i + BLOCK) for i in range(0, rows, BLOCK)], self._threads)
         return result
 
     def _step(self, request: IkRequest, max_step: Array, posture: Array, posture_gain: float, damping: float) -> IkStep:
@@ -127,8 +123,3 @@ class NumbaIk(InverseKinematics):
         seed = self.chain.initial[None]
         self.solve(identity, identity, seed, random_restarts=0, rng_seeds=np.zeros(1, np.uint64))
         self.step(identity, identity, seed, max_step=1.0)
-
-
-def _cores() -> int:
-    affinity = getattr(os, "sched_getaffinity", None)  # Linux only
-    return len(affinity(0)) if affinity else os.cpu_count() or 1

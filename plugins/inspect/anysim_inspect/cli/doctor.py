@@ -80,8 +80,9 @@ def machine() -> "list[Finding]":
 
 
 def _processors() -> str:
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return f"{usable} usable of {os.cpu_count()}"
+    from anysim.threads import usable_cores
+
+    return f"{usable_cores()} usable of {os.cpu_count()}"
 
 
 def _cache() -> "Finding":

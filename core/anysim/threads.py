@@ -1,0 +1,59 @@
+"""Work on the rows of a batch, shared by the threads of this process.
+
+It gains where the work lets other threads run meanwhile, as compiled kernels and solvers in C do.
+"""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import TypeVar
+
+Part = TypeVar("Part")
+
+NAME = "anysim shared"
+"""How the names of these threads begin; they wait for work until the process ends."""
+
+_pools: list[ThreadPoolExecutor] = []
+"""None or one: made when it is first needed. A process that was forked has none of its threads, and makes its own."""
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pools.clear)
+
+
+def usable_cores() -> int:
+    """The cores that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def shared(work: Callable[[Part], object], parts: Iterable[Part], threads: int | None = None) -> None:
+    """Do `work(part)` for each part, in any order, and return when all are done.
+
+    Args:
+        work: what is done; it may share work itself.
+        parts: of what there is to do.
+        threads: at most so many, the caller's among them; as many as there are usable cores if not given.
+
+    Raises:
+        Exception: whatever the work raises first, when nobody works any more.
+    """
+    left = deque(parts)
+
+    def go() -> None:
+        while left:
+            try:
+                part = left.popleft()
+            except IndexError:  # somebody else was faster
+                return
+            work(part)
+
+    helpers = min(len(left), threads or usable_cores()) - 1
+    if helpers > 0 and not _pools:
+        _pools.append(ThreadPoolExecutor(max(1, usable_cores() - 1), NAME))
+    others = [_pools[0].submit(go) for _ in range(helpers)]
+    try:
+        go()
+    finally:
+        begun = [one for one in others if not one.cancel()]  # who has not begun by now finds nothing left to do
+        wait(begun)
+    for one in begun:
+        one.result()
