@@ -1,16 +1,18 @@
 """The gallery of tasks in docs/tasks.md, from docs/tasks.json and the tasks themselves.
 
     python scripts/task_gallery.py [--check]
-    python scripts/task_gallery.py --measure [TASK …]
+    python scripts/task_gallery.py --measure [--episodes N] [TASK …]
 
 `--measure` draws the picture of each task that has none. Where a task is new or has changed it evaluates its expert, or
 the learned policy that comes with it where it has none, and a random policy: one on one engine at a time, short tasks
 first. It takes minutes for each, and goes on where it was cut off: finished ones are in docs/tasks.json, the episodes
-of the one at hand in runs/gallery. Figures of the tasks of `core12` are those of docs/benchmark.json where these have
+of the one at hand in runs/gallery. Where an episode takes a minute, `--episodes` asks for fewer; more can be added
+later. Figures of the tasks of `core12` are those of docs/benchmark.json where these have
 as many episodes. `--check` writes nothing and exits with 1 if the page has drifted, or if an expert or such a policy
 solves less than the difficulty of its task promises.
 """
 
+import argparse
 import json
 import re
 import subprocess
@@ -76,21 +78,28 @@ def difficulty(name: str) -> str:
     return said[1]
 
 
-def measure(only: list[str]) -> None:
+def measure(words: list[str]) -> None:
     """Draw and evaluate what is new or has changed."""
-    known = stored()
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--episodes", type=int, default=max(EPISODES.values()))
+    parser.add_argument("tasks", nargs="*")
+    asked = parser.parse_args(words)
+    only, known = asked.tasks, stored()
+    episodes = {policy: min(count, asked.episodes) for policy, count in EPISODES.items()}
     specs = {name: spec_hash(load(name).spec) for name in only or tasks()}
     for name in specs:
         picture = task_path(name).with_name("picture.jpg")
         if not picture.exists():
             draw(name, picture)
-    left = [cell for cell in cells(list(specs)) if not _enough(known.get(cell.task, {}), cell, specs[cell.task])]
+    left = [
+        cell for cell in cells(list(specs)) if not _enough(known.get(cell.task, {}), cell, specs[cell.task], episodes)
+    ]
     for number, cell in enumerate(left, 1):
         sys.stderr.write(f"{number} of {len(left)}: {' '.join(cell)}\n")
         figures: Figures = known.get(cell.task, {})
         if figures.get("spec") != specs[cell.task]:
             figures = {"spec": specs[cell.task]}
-        found = _benchmarked(cell, specs[cell.task]) or evaluated(cell, specs[cell.task])
+        found = _benchmarked(cell, specs[cell.task]) or evaluated(cell, specs[cell.task], episodes[cell.policy])
         figures.setdefault(cell.policy, {})[cell.engine] = found
         known = stored() | {cell.task: figures}
         write_whole(STORE.parent, {STORE.name: json.dumps(known, indent=1, sort_keys=True) + "\n"})
@@ -111,9 +120,9 @@ def solver(spec: RunSpec) -> str | None:
     return "shipped" if spec.task and spec.task.shipped else None
 
 
-def _enough(figures: Figures, cell: Cell, spec: str) -> bool:
+def _enough(figures: Figures, cell: Cell, spec: str, episodes: dict[str, int]) -> bool:
     _, attempts, faults = figures.get(cell.policy, {}).get(cell.engine, (0, 0, 0))
-    return figures.get("spec") == spec and attempts + faults >= EPISODES[cell.policy]
+    return figures.get("spec") == spec and attempts + faults >= episodes[cell.policy]
 
 
 def _benchmarked(cell: Cell, spec: str) -> list[int] | None:
@@ -127,9 +136,9 @@ def _benchmarked(cell: Cell, spec: str) -> list[int] | None:
     return None
 
 
-def evaluated(cell: Cell, spec: str) -> list[int]:
+def evaluated(cell: Cell, spec: str, count: int) -> list[int]:
     """What `anysim evaluate` says of it."""
-    folder, count = RUNS / cell.task / spec[:12] / cell.policy, EPISODES[cell.policy]
+    folder = RUNS / cell.task / spec[:12] / cell.policy
     words = ["evaluate", cell.task, "--policy", cell.policy, "--engine", cell.engine, "--split", SPLIT]
     run_anysim(*words, "--episodes", str(count), "--out", str(folder))
     told: Figures = json.loads((folder / "evaluation.json").read_text("utf-8"))
