@@ -7,9 +7,9 @@
 the learned policy that comes with it where it has none, and a random policy: one on one engine at a time, short tasks
 first. It takes minutes for each, and goes on where it was cut off: finished ones are in docs/tasks.json, the episodes
 of the one at hand in runs/gallery. Where an episode takes a minute, `--episodes` asks for fewer; more can be added
-later. Figures of the tasks of `core12` are those of docs/benchmark.json where these have
-as many episodes. `--check` writes nothing and exits with 1 if the page has drifted, or if an expert or such a policy
-solves less than the difficulty of its task promises.
+later. Figures of the tasks of `core12` are those of docs/benchmark.json where these have as many episodes. `--check`
+writes nothing and exits with 1 if the page has drifted, or if an expert or such a policy solves less than the
+difficulty of its task promises.
 """
 
 import argparse
@@ -80,9 +80,9 @@ def difficulty(name: str) -> str:
 
 def measure(words: list[str]) -> None:
     """Draw and evaluate what is new or has changed."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--episodes", type=int, default=max(EPISODES.values()))
-    parser.add_argument("tasks", nargs="*")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--episodes", type=int, default=max(EPISODES.values()), help="at most, of each policy")
+    parser.add_argument("tasks", nargs="*", help="all of them if not given")
     asked = parser.parse_args(words)
     only, known = asked.tasks, stored()
     episodes = {policy: min(count, asked.episodes) for policy, count in EPISODES.items()}

@@ -138,8 +138,8 @@ def _listing() -> frozenset[str]:
 def _nothing_runs_on() -> Iterator[None]:
     """At the end of the session no thread and no worker process of a test is alive."""
     yield
-    kept = ("MainThread", shared_threads.NAME)
-    threads = [t.name for t in threading.enumerate() if not (t.daemon or t.name.startswith(kept))]
+    others = [t for t in threading.enumerate() if t is not threading.main_thread() and not t.daemon]
+    threads = [t.name for t in others if not t.name.startswith(shared_threads.NAME)]
     processes = [f"{p.name} ({p.pid})" for p in multiprocessing.active_children()]
     assert not threads, f"threads that no test stopped: {', '.join(threads)}"
     assert not processes, f"processes that no test stopped: {', '.join(processes)}"

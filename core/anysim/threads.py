@@ -7,6 +7,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache
 from typing import TypeVar
 
 Part = TypeVar("Part")
@@ -14,15 +15,19 @@ Part = TypeVar("Part")
 NAME = "anysim shared"
 """How the names of these threads begin; they wait for work until the process ends."""
 
-_pools: list[ThreadPoolExecutor] = []
-"""None or one: made when it is first needed. A process that was forked has none of its threads, and makes its own."""
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pools.clear)
-
 
 def usable_cores() -> int:
     """The cores that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(max(1, usable_cores() - 1), NAME)
+
+
+if hasattr(os, "register_at_fork"):  # who was forked has none of its threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def shared(work: Callable[[Part], object], parts: Iterable[Part], threads: int | None = None) -> None:
@@ -47,9 +52,7 @@ def shared(work: Callable[[Part], object], parts: Iterable[Part], threads: int |
             work(part)
 
     helpers = min(len(left), threads or usable_cores()) - 1
-    if helpers > 0 and not _pools:
-        _pools.append(ThreadPoolExecutor(max(1, usable_cores() - 1), NAME))
-    others = [_pools[0].submit(go) for _ in range(helpers)]
+    others = [_pool().submit(go) for _ in range(helpers)]
     try:
         go()
     finally:

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from functools import cache
 
 import pytest
 
@@ -13,7 +14,7 @@ from tests.forked import run
 @pytest.fixture(autouse=True)
 def several_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads, "usable_cores", lambda: 4)
-    monkeypatch.setattr(threads, "_pools", [])
+    monkeypatch.setattr(threads, "_pool", cache(threads._pool.__wrapped__))
 
 
 @pytest.mark.parametrize("most", [None, 1, 2, 9])

@@ -55,12 +55,13 @@ def bending_force(
     from scipy.sparse import csc_array, csr_array
     from scipy.sparse.linalg import splu
 
-    stiff = csr_array(-rigidity * matrix)  # a point has some 13 neighbours, and no more entries
-    later = csc_array(np.eye(len(mass)) - h * damping * stiff.toarray() / mass[None, :])
+    stiff = -rigidity * matrix
+    bent = csr_array(stiff)  # a point has some 13 neighbours, and no more entries
+    later = csc_array(np.eye(len(mass)) - h * damping * stiff / mass[None, :])
     factors = splu(later, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
     def force(_: int, places: Array, velocities: Array) -> Array:
-        both = stiff @ np.concatenate([places, damping * velocities], axis=1)
+        both = bent @ np.concatenate([places, damping * velocities], axis=1)
         return both[:, :3] + factors.solve(both[:, 3:])
 
     return force
