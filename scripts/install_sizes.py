@@ -55,6 +55,7 @@ WORDS = {
     "mobile": "bases that drive up to things, follow people, and stop for them; `anysim bench stopping`",
     "mujoco": "the engine MuJoCo, and MJCF files",
     "navigation": "`anysim map`: where bases can go, ways through rooms, and local planning around what moves",
+    "navigation-bench": "`anysim bench navmesh|navigate`: ways through furnished rooms, on maps and in physics",
     "parity": "`anysim compare` and `anysim picture`",
     "particles": "fluid, sand and rice beside any engine",
     "planning": "collision-free motion, planned beside the simulation",

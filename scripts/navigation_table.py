@@ -16,8 +16,8 @@ from typing import Any
 from benchmark_table import table
 from generated import ROOT, main
 
-from anysim_navigation.drive_bench import BASES, MET
-from anysim_navigation.drive_cells import DriveStore, rows
+from anysim_navigation_bench.drive_store import DriveStore, rows
+from anysim_navigation_bench.drives import BASES, MET
 
 STORE = ROOT / "docs" / "navigation.json"
 WORDS = {

@@ -88,6 +88,6 @@ class PlannedBase(Base):
             most[1] = most[0] / options["turning_radius"]
         if self._labels == ("forward", "left", "turn"):
             options["side"] = min(self.pace.speed, float(most[1]))
-            options["back"] = min(self.pace.speed, float(-least[0]))
+        options["back"] = min(self.pace.speed, float(-least[0]))
         speed, turn = min(self.pace.speed, float(most[0])), min(self.pace.rate, float(most[-1]))
         return limits_of(kind, discs, speed=speed, turn=turn, **options)

@@ -1,11 +1,11 @@
-"""`anysim map`, `anysim bench navmesh` and `anysim bench navigate`."""
+"""`anysim map`."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from anysim.cli.options import AsJson, Overrides, parts
+from anysim.cli.options import AsJson, Overrides
 
 
 def make_map(
@@ -50,120 +50,3 @@ def make_map(
         f"{columns} x {rows} cells of {resolution:g} m, {100 * share:.0f} % occupied; {len(made.parts)} pieces of wall"
     )
     typer.echo(f"{out}: map.yaml, map.png, floor_plan.png, walls.json")
-
-
-def navmesh(
-    rooms: Annotated[int, typer.Option(min=1, help="Furnished rooms.")] = 20,
-    queries: Annotated[int, typer.Option(min=1, help="Queries in each.")] = 200,
-    compared: Annotated[int, typer.Option(min=0, help="Ways in each that are held against the shortest.")] = 20,
-    radius: Annotated[float, typer.Option(min=0.01, help="Of what moves there [m].")] = 0.25,
-    json: AsJson = False,
-) -> None:
-    """Ways through furnished rooms: failures, lengths against the shortest, clearance, and what meshes and ways cost.
-
-    Examples:
-      anysim bench navmesh --rooms 200
-    """
-    import numpy as np
-
-    from anysim.cli.output import counting, print_json, print_table
-    from anysim_navigation.agent import Agent
-    from anysim_navigation.bench import measure_room, random_room
-
-    agent, rng = Agent(radius), np.random.default_rng(0)
-    found = []
-    measure_room(random_room(0), agent, 1, np.random.default_rng(0), compared=0)  # kernels are compiled
-    with counting("rooms", rooms, quiet=json) as show:
-        for seed in range(rooms):
-            found.append(measure_room(random_room(seed), agent, queries, rng, compared=compared))
-            show(f"room {seed}: {found[-1].ways} ways, {found[-1].refused} refused", "")
-    excess = np.array([e for one in found for e in one.excess] or [np.nan])
-    query = 1e3 * np.array([t for one in found for t in one.query] or [np.nan])
-    bake = 1e3 * np.array([one.bake for one in found])
-    figures = {
-        "ways": sum(one.ways for one in found),
-        "refused": sum(one.refused for one in found),
-        "failures": sum(one.failures for one in found),
-        "nearest_over_radius_m": min(one.nearest for one in found),
-        "length_median": float(np.median(excess)),
-        "length_p95": float(np.quantile(excess, 0.95)),
-        "length_max": float(excess.max()),
-        "bake_ms_p50": float(np.median(bake)),
-        "bake_ms_p95": float(np.quantile(bake, 0.95)),
-        "query_ms_p50": float(np.median(query)),
-        "query_ms_p95": float(np.quantile(query, 0.95)),
-        "triangles_p50": float(np.median([one.triangles for one in found])),
-    }
-    if json:
-        print_json(figures)
-        return
-    rows = [(name.replace("_", " "), f"{value:.4g}") for name, value in figures.items()]
-    print_table(f"Ways of a disc of {radius:g} m in {rooms} rooms, {queries} queries each", ("what", "is"), rows)
-
-
-def navigate(
-    robots: Annotated[
-        str,
-        typer.Option(
-            help="Bases, separated by commas: of wheels, unitree_go1, unitree_g1, others with a base channel."
-        ),
-    ] = "differential_base,holonomic_base,ackermann_base",
-    engines: Annotated[str, typer.Option("--engines", "-e", help="Installed engines, separated by commas.")] = "mujoco",
-    rooms: Annotated[int, typer.Option(min=1, help="Furnished rooms for each.")] = 20,
-    people: Annotated[int, typer.Option(min=0, max=8, help="Who walk there meanwhile and do not yield.")] = 0,
-    out: Annotated[
-        Path | None, typer.Option(help="A JSON file of all drives, which is added to: what it has is not driven again.")
-    ] = None,
-    json: AsJson = False,
-) -> None:
-    """Drive bases from end to end of furnished rooms in an engine, over 4 m each, with `planner: dynamic_window`.
-
-    A way fails that takes 90 s, or on which something in the room or a person is touched with more than 20 N.
-
-    Examples:
-      anysim bench navigate --robots holonomic_base --rooms 100
-      anysim bench navigate --robots holonomic_base --people 4 --out people.json
-    """
-    from itertools import count
-
-    from anysim.cli.output import counting, print_json, print_table
-    from anysim_navigation.drive_bench import drive
-    from anysim_navigation.drive_cells import Cell, DriveStore, figures
-
-    store = DriveStore(out)
-    cells = [
-        Cell(robot, engine, people) for robot in parts(robots, "--robots") for engine in parts(engines, "--engines")
-    ]
-    with counting("rooms", rooms * len(cells), quiet=json) as show:
-        for cell in cells:
-            known, driven = {one.seed: one for one in store.known(cell)}, 0
-            for seed in count():
-                if driven == rooms:
-                    break
-                one = known.get(seed)
-                if one is None:
-                    one = drive(seed, cell.robot, cell.engine, people=people)
-                    if one is None:  # the room is too small for such a way
-                        continue
-                    store.add(cell, one)
-                driven += 1
-                show(f"{cell.robot}, {cell.engine}, room {seed}: {one.ended} after {one.seconds:.1f} s", "")
-    found = [figures(cell, store.known(cell)[:rooms]) for cell in cells]
-    if json:
-        print_json(found)
-        return
-    words = ("robot", "engine", "people", "rooms", "solved", "interval", "failed", "hardest [N]", "time", "action [ms]")
-    shown = [[_cell(v) for v in list(one.values())[: len(words)]] for one in found]
-    print_table(
-        f"Ways over 4 m through {rooms} furnished rooms",
-        (*words, "met"),
-        [[*line, _cell(one["met"])] for line, one in zip(shown, found, strict=True)],
-    )
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{key}: {v}" for key, v in value.items())
-    if isinstance(value, list):
-        return " to ".join(map(str, value))
-    return f"{value:.3g}" if isinstance(value, float) else str(value)

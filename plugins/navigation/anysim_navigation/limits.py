@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -147,14 +147,19 @@ def output_of(limits: BaseLimits, labels: tuple[str, ...], twist: Array, wheelba
     return np.stack([twist[:, 0], np.arctan(wheelbase * np.clip(curvature, -most, most))], axis=1)
 
 
-def discs_over(low: Array, high: Array, least: int = 1) -> Array:
-    """(D, 3) discs in a row, `least` or more, over a rectangle from `low` to `high` (2,) [m], along its longer side."""
-    size, middle = high - low, (high + low) / 2
+def discs_over(outline: Array, least: int = 1) -> Array:
+    """(D, 3) discs in a row, `least` or more, over the hull of points (K, 2) [m], along its longer side."""
+    import shapely
+
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    size = high - low
     long = int(size[1] > size[0])
     count = max(least, int(np.ceil(size[long] / size[1 - long] - 0.2)))
-    step = size[long] / count
-    discs = np.zeros((count, 3))
-    discs[:, long] = low[long] + step * (np.arange(count) + 0.5)
-    discs[:, 1 - long] = middle[1 - long]
-    discs[:, 2] = np.hypot(step, size[1 - long]) / 2
+    discs = np.empty((count, 3))
+    hull: Any = shapely.MultiPoint(outline).convex_hull
+    for k in range(count):
+        low[long], high[long] = (outline[:, long].min() + size[long] * (k + e) / count for e in (0, 1))
+        discs[k, :2] = 0.5 * (low + high)
+        part: Any = hull.intersection(shapely.box(*low, *high))
+        discs[k, 2] = np.hypot(*(np.array(part.exterior.coords) - discs[k, :2]).T).max()
     return discs

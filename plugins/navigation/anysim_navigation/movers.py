@@ -1,14 +1,15 @@
 """Movers: what goes through a room by itself, as discs with the velocities that they have."""
 
 from collections.abc import Sequence
+from math import inf
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError, listing, suggest
-from anysim.geometry.bounds import EntityShape
 from anysim.model.world import BodyKind, Entity, EntityKind, JointType, World
 from anysim.task.scene import SceneView
+from anysim_navigation.robot_shape import outline_of
 
 PARKED = 100.0
 """[m] how far off a mover is put that is not there."""
@@ -16,8 +17,9 @@ STANDS = 0.1
 """[m/s] a mover that is slower stands in the way as furniture does."""
 PEOPLE = "avatar"
 """The family whose members walk."""
-STRIDE = 0.08
-"""[m] by which feet and hands of people come further out than as they stand."""
+ASIDE, STRIDE = 0.08, 0.33
+"""[m] to their sides and [s] of their way before and behind them, people take more room than as they stand: measured of
+feet, at 0.2 to 0.5 m/s."""
 
 
 def movers_of(world: World, robot: str, names: Sequence[str] | None = None) -> tuple[str, ...]:
@@ -59,7 +61,8 @@ class Movers:
         bodies: all of theirs.
     """
 
-    def __init__(self, scene: SceneView, names: Sequence[str]) -> None:
+    def __init__(self, scene: SceneView, names: Sequence[str], top: float = inf) -> None:
+        """What of them is higher than `top` [m] above the ground takes no room."""
         world = scene.engine.world
         self._scene = scene
         entities = [world.entities[world.entity_numbers[name]] for name in names]
@@ -68,11 +71,17 @@ class Movers:
         moving = [moving_body(world, e) for e in entities]
         self._roots = np.array([e.root if m is None else m for e, m in zip(entities, moving, strict=True)], np.int64)
         self.bodies = {body for e in entities for body in range(e.body_start, e.body_stop)}
-        upright = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-        corners = [EntityShape(world, name).bounds(upright) for name in names]
-        self._offset = np.array([0.5 * (low + high)[:2] for low, high in corners]).reshape(-1, 2)
-        stride = [STRIDE * (entity.family == PEOPLE) for entity in entities]
-        self._radius = np.array([0.5 * float((high - low)[:2].max()) for low, high in corners]) + stride
+        low, high = np.zeros((2, len(entities), 2))
+        for k, entity in enumerate(entities):
+            outline = outline_of(world, entity.name, world.initial_body_pose[self._roots[k]], top)
+            low[k], high[k] = outline.min(axis=0), outline.max(axis=0)
+        people = np.array([entity.family == PEOPLE for entity in entities], dtype=bool)
+        self._offset, radius = 0.5 * (low + high), 0.5 * (high - low).max(axis=1) + ASIDE * people
+        each = np.arange(len(entities))
+        self._discs = np.concatenate([each, each[people]])
+        """(M,) the mover of each disc: people have one before them and one behind."""
+        self._radius = radius[self._discs]
+        self._stride = STRIDE * np.concatenate([people, -np.ones(people.sum())])
 
     def there(self, row: int, standing: bool) -> Array:
         """(E,) bool: the entities that a map is to have, in a row of the scene: of movers none, or those that stand."""
@@ -83,14 +92,14 @@ class Movers:
         return present
 
     def around(self, rows: Array, pose: Array) -> Array:
-        """(n, M, 5) x, y, vx, vy and radius in frames x, y, yaw (n, 3); `rows` are those of the scene."""
+        """(n, M, 5) x, y, vx, vy and radius of discs in frames x, y, yaw (n, 3); `rows` are those of the scene."""
         if not len(self._roots):
             return np.zeros((len(rows), 0, 5))
-        envs = self._scene.env_ids[rows]
-        state = self._scene.state
+        envs, state = self._scene.env_ids[rows], self._scene.state
         place = state.body_pose[envs][:, self._roots, :2] + self._offset - pose[:, None, :2]
-        speed = state.body_twist[envs][:, self._roots, :2]
         place[~self._scene.presence[envs][:, self._numbers]] += PARKED
+        speed = state.body_twist[envs][:, self._roots, :2][:, self._discs]
+        place = place[:, self._discs] + self._stride[:, None] * speed
         c, s = np.cos(pose[:, 2])[:, None], np.sin(pose[:, 2])[:, None]
         turned = [
             np.stack([c * v[..., 0] + s * v[..., 1], c * v[..., 1] - s * v[..., 0]], axis=-1) for v in (place, speed)

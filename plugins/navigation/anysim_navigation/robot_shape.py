@@ -20,13 +20,20 @@ LEAST_HEIGHT = 0.3
 
 def discs_of(world: World, robot: str, frame_pose: Array, least: int = 1, sway: float = 0.0) -> Array:
     """(D, 3) discs over a robot as it begins, its frame at a pose (7,), in that frame, and `sway` [m] to its sides."""
-    outlines = np.concatenate(_outlines(world, robot))
+    outline, aside = outline_of(world, robot, frame_pose), np.array([0.0, sway])
+    return discs_over(np.concatenate([outline - aside, outline + aside]), least)
+
+
+def outline_of(world: World, entity: str, frame_pose: Array, top: float = inf) -> Array:
+    """(K, 2) [m] points around what of an entity, as it begins, is below a height: around all of it if nothing is."""
+    found = world.entities[world.entity_numbers[entity]]
+    others = {-1, *range(found.body_start), *range(found.body_stop, len(world.bodies))}
+    band = (footprints(world, world.initial_body_pose, heights, others) for heights in ((STEP, top), (-inf, inf)))
+    outlines = np.concatenate(next(each for each in band if each))
     off = np.concatenate([outlines - frame_pose[:2], np.zeros((len(outlines), 1))], axis=1)
     half = 0.5 * P.yaw(frame_pose[3:])
     level = np.array([0.0, 0.0, np.sin(half), np.cos(half)])
-    local = P.rotate_inverse(np.tile(level, (len(off), 1)), off)[:, :2]
-    aside = np.array([0.0, sway])
-    return discs_over(local.min(axis=0) - aside, local.max(axis=0) + aside, least)
+    return P.rotate_inverse(np.tile(level, (len(off), 1)), off)[:, :2]
 
 
 def agent_of(world: World, robot: str, limits: BaseLimits) -> Agent:
@@ -36,10 +43,3 @@ def agent_of(world: World, robot: str, limits: BaseLimits) -> Agent:
     entity = world.entities[world.entity_numbers[robot]]
     top = float(EntityShape(world, robot).bounds(world.initial_body_pose[entity.root])[1][2])
     return Agent(limits.radius, max(LEAST_HEIGHT, top + OVER), STEP)
-
-
-def _outlines(world: World, robot: str) -> list[Array]:
-    entity = world.entities[world.entity_numbers[robot]]
-    own = range(entity.body_start, entity.body_stop)
-    others = set(range(len(world.bodies))) - set(own)
-    return footprints(world, world.initial_body_pose, (STEP, inf), {-1, *others})

@@ -16,6 +16,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.scene import Frame, RobotView, SceneView
 from anysim_navigation.agent import NoRoute
+from anysim_navigation.beam_search import WITHIN, BeamSearch
 from anysim_navigation.car_ways import car_way
 from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
 from anysim_navigation.limits import SWAY, BaseKind, BaseLimits
@@ -35,12 +36,16 @@ NEAR = 0.35
 """[m] from its end a way is left for the straight line, if that is free."""
 CAR_STOPS = 0.15
 """[m] from its end a car has arrived: its heading there is that of the way."""
-CUSP = 0.05
-"""[m] before it changes its direction a car may do so."""
+CUSP, AMONG = 0.05, 0.15
+"""[m] before it changes its direction a car may do so; among movers it need not come as near."""
 REPLANS = 12
 """Ways in a row that did not bring a base nearer to its end before it gives up; a quarter where nobody moves."""
 NEARER = 0.1
 """[m] of the way that count as nearer."""
+SEARCHING = (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN)
+"""Who cannot go aside, and among movers searches for several velocities in a row."""
+FREE, AWHILE = 0.9, 2.0
+"""[m] nobody comes nearer than that, for so many seconds [s], where a base goes straight to its end among movers."""
 SNAP = 0.6
 """[m] by which the base may stand off the mesh: something may have come near it."""
 
@@ -96,7 +101,8 @@ class BaseRouter:
         height = frame_pose(scene, frame)[2]
         self._grid = Grid((6.0, 6.0), 0.04, agent.step - height, agent.height - height)
         self._eye = Eye(scene, frame, "collision", "entity")
-        self._movers = Movers(scene, movers)
+        self._movers = Movers(scene, movers, agent.height)
+        self.search = BeamSearch(limits) if movers and limits.kind in SEARCHING else None
         self._seen = self._eye.seen & self._eye.geometry.without(self._movers.bodies)
         self._every = max(1, round(STEP / world.physics.control_dt))
         self.target, self.twist = np.zeros((2, n, 3))
@@ -128,7 +134,11 @@ class BaseRouter:
         pose = pose_of(self._frame.pose)
         due = self._steps[ids] % self._every == 0
         self._steps[ids] += 1
-        route = np.flatnonzero(due & (self.mode[ids] == Mode.ROUTE))
+        routed = self.mode[ids] == Mode.ROUTE
+        if self.search is not None:  # who has come near its end may have to give way yet
+            ends = [self._progress[env] is not None for env in ids.tolist()]
+            routed |= (self.mode[ids] == Mode.DIRECT) & ends
+        route = np.flatnonzero(due & routed)
         if len(route):
             self._tick(ids, route, pose)
         for row, env in enumerate(ids.tolist()):
@@ -245,17 +255,24 @@ class BaseRouter:
         if car and float(np.hypot(*(end - pose[:2]))) < CAR_STOPS:
             self.mode[env], self.twist[env] = Mode.STAND, 0.0  # it cannot turn on the spot, so there is nothing to do
             return
-        if progress.left < NEAR and not car and self._straight(field, pose, end):
+        searching = self.search is not None and bool((np.hypot(movers[:, 0], movers[:, 1]) < WITHIN).any())
+        alone = not searching or _is_free(movers)
+        if progress.left < NEAR and not car and alone and self._straight(field, pose, end):
             self.mode[env] = Mode.DIRECT
             way = in_frame(pose, end[None])[0]
             self.twist[env] = self._pose_control.twist(way, P.wrapped(self.target[env, 2] - pose[2]), self.twist[env])
             return
-        if self._later[env] and progress.left < CUSP:
+        self.mode[env] = Mode.ROUTE
+        if self._later[env] and progress.left < (AMONG if searching else CUSP):
             path, self._gear[env] = self._later[env].pop(0)
             progress = self._progress[env] = Progress(path)
             progress.look(pose[:2], 0.0)
         path, aim = self.window.ahead(progress, pose, field, cell)
         gear = float(self._gear[env])
+        if searching:
+            assert self.search is not None
+            self.twist[env], _ = self.search.choose(field, cell, aim, now, movers, gear)
+            return
         if progress.recovering > 0:
             aim, gear = _roomiest(field, cell, movers), 0.0
             path = aim[None]
@@ -293,6 +310,12 @@ def frame_pose(scene: SceneView, frame: Frame) -> Array:
     at = scene.engine.index.frame(frame.name)
     local = np.array([*at.position, *at.quaternion])
     return P.compose(scene.engine.world.initial_body_pose[at.body], local)
+
+
+def _is_free(movers: Array) -> bool:
+    """Whether nobody comes near for a while who goes on as he does."""
+    times = np.linspace(0.0, AWHILE, 11)[:, None, None]
+    return bool((np.linalg.norm(movers[:, :2] + times * movers[:, 2:4], axis=-1) > FREE).all())
 
 
 def _roomiest(field: Array, cell: float, movers: Array) -> Array:

@@ -1,5 +1,6 @@
 """Local planning: the five rules that let a base get through, the variants, prediction, direct control."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -257,21 +258,32 @@ def test_channels_get_what_they_take() -> None:
         limits_of(BaseKind.ACKERMANN, DISC, speed=1.0, turn=1.0)
 
 
+def corners(low: Sequence[float], high: Sequence[float]) -> Array:
+    return np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
+
+
 @pytest.mark.parametrize("size", [(0.6, 0.5), (1.1, 0.4), (0.3, 1.0)])
 def test_discs_cover_a_rectangle(size: tuple[float, float]) -> None:
     low, high = np.array([-0.1, 0.2]), np.array([-0.1, 0.2]) + size
-    discs = discs_over(low, high)
+    discs = discs_over(corners(low, high))
     points = np.random.default_rng(0).uniform(low, high, (500, 2))
     off = np.hypot(points[:, None, 0] - discs[:, 0], points[:, None, 1] - discs[:, 1])
     assert (off <= discs[:, 2] + 1e-9).any(axis=1).all()
 
 
+def test_discs_are_as_narrow_as_what_they_cover() -> None:
+    """The hull of a body and its wheels lacks the corners of the rectangle around it."""
+    hexagon = np.array([(0.3, 0.1), (0.3, -0.1), (0.0, 0.3), (0.0, -0.3), (-0.3, 0.1), (-0.3, -0.1)])
+    (disc,) = discs_over(hexagon)
+    assert np.allclose(disc, [0.0, 0.0, np.hypot(0.3, 0.1)])
+
+
 def test_who_is_wider_than_deep_keeps_its_width_from_things() -> None:
     """Discs beside each other are narrow, but the base that they cover is not."""
-    wide = limits_of(BaseKind.HUMANOID, discs_over(np.array([-0.1, -0.3]), np.array([0.1, 0.3])), speed=0.25, turn=0.3)
+    wide = limits_of(BaseKind.HUMANOID, discs_over(corners((-0.1, -0.3), (0.1, 0.3))), speed=0.25, turn=0.3)
     assert wide.radius >= 0.3
     assert wide.discs[:, 2].max() < 0.2
-    long = limits_of(BaseKind.QUADRUPED, discs_over(np.array([-0.3, -0.1]), np.array([0.3, 0.1])), speed=0.5, turn=0.8)
+    long = limits_of(BaseKind.QUADRUPED, discs_over(corners((-0.3, -0.1), (0.3, 0.1))), speed=0.5, turn=0.8)
     assert long.radius == pytest.approx(long.discs[:, 2].max())
 
 

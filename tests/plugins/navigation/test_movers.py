@@ -14,9 +14,9 @@ from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from anysim_navigation.base_planner import PlannedBase
-from anysim_navigation.drive_bench import HARD, drive
 from anysim_navigation.movers import Movers, movers_of
 from anysim_navigation.router import _roomiest
+from anysim_navigation_bench.drives import HARD, drive
 from tests.tiers import others
 
 BALL = {"source": {"box": [0.4, 0.4, 0.4]}}

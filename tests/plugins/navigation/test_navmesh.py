@@ -18,10 +18,10 @@ from anysim.model.world import Box, World
 from anysim.testing.sketch import Sketch
 from anysim_navigation import commands
 from anysim_navigation.agent import Agent, NoRoute
-from anysim_navigation.bench import measure_room, random_room
 from anysim_navigation.maps import NavMaps
 from anysim_navigation.navmesh import length_of
 from anysim_navigation.visibility import VisibilityGraph
+from anysim_navigation_bench.rooms import measure_room, random_room
 
 ROOM = Path(__file__).parents[3] / "docs/worlds/room.yaml"
 AREA = [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0]]

@@ -9,8 +9,8 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
-from anysim_navigation.drive_bench import HARD, drive
 from anysim_navigation.movers import Movers
+from anysim_navigation_bench.drives import HARD, drive
 from tests.plugins.skills.test_navigate import WORLD
 
 

@@ -72,7 +72,8 @@ def distance_to_path(path: Array, x: float, y: float) -> float:
 
 
 @compiled
-def _toward(now: float, wanted: float, most: float) -> float:
+def toward(now: float, wanted: float, most: float) -> float:
+    """A value as near to the wanted one as it gets by `most`."""
     return now + min(most, max(-most, wanted - now))
 
 
@@ -139,9 +140,9 @@ def choose(
                 braking = max(speed / acceleration[0], abs(turn) / acceleration[2]) + 2 * step
                 near, hit, free = 0.0, 0.0, True
                 for k in range(1, steps + 1):
-                    vx = _toward(vx, forward, acceleration[0] * step)
-                    vy = _toward(vy, aside, acceleration[1] * step)
-                    w = _toward(w, turn, acceleration[2] * step)
+                    vx = toward(vx, forward, acceleration[0] * step)
+                    vy = toward(vy, aside, acceleration[1] * step)
+                    w = toward(w, turn, acceleration[2] * step)
                     middle = yaw + 0.5 * w * step
                     x += (vx * math.cos(middle) - vy * math.sin(middle)) * step
                     y += (vx * math.sin(middle) + vy * math.cos(middle)) * step

@@ -13,9 +13,9 @@ from anysim.skills.runner import SkillPolicy
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
 from anysim_navigation.agent import Agent, NoRoute
-from anysim_navigation.bench import free_pairs, random_room, room_of
 from anysim_navigation.maps import NavMaps
 from anysim_navigation.navmesh import NavMesh, length_of
+from anysim_navigation_bench.rooms import free_pairs, random_room, room_of
 
 FURTHER = 4.0
 """[m] that ways are longer than."""
@@ -60,7 +60,7 @@ class Driving(NamedTuple):
 
 _ON_LEGS: dict[str, Any] = {"close": 0.25, "facing": 0.3, "still": (0.15, 0.6), "tilts": True}
 BASES: dict[str, Driving] = {
-    "differential_base": Driving(controller="differential_drive"),
+    "differential_base": Driving(controller="differential_drive", skill={"rate": 2.5}),
     "holonomic_base": Driving(controller="holonomic_drive"),
     "ackermann_base": Driving(
         0.7,

@@ -10,7 +10,7 @@ import numpy as np
 from anysim.errors import AnysimError
 from anysim.math.statistics import wilson
 from anysim.record.commit import write_whole
-from anysim_navigation.drive_bench import BASES, Drive, Driving
+from anysim_navigation_bench.drives import BASES, Drive, Driving
 
 PLACES = {"seconds": 2, "length": 2, "hardest": 1, "tick": 3}
 """Decimals of fields of a drive that are kept."""

@@ -1,0 +1,123 @@
+"""Compiled search over space and time: motions in a row, of which the most promising are gone on with."""
+
+import math
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.math.compiled import compiled
+from anysim_navigation.kernels.window import SETTLED, clearances, toward
+
+CONTACT, NEAR, TIGHT, TURN, HEADING, LATE = range(6)
+"""Places of the weights."""
+X, Y, YAW, SPEED, RATE, SPENT, FIRST = range(7)
+"""Columns of a node: where it is, how fast, what its motions have cost, and the first of them."""
+PLACE, ANGLE = 0.12, 0.4
+"""[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all."""
+
+
+@compiled
+def wrapped(angle: float) -> float:
+    """An angle within half a turn."""
+    return math.atan2(math.sin(angle), math.cos(angle))
+
+
+@compiled
+def cell_of(node: Array) -> int:
+    """What nodes have in common of which the better one is enough."""
+    i, j = math.floor(node[X] / PLACE) + 500, math.floor(node[Y] / PLACE) + 500
+    turned = math.floor(wrapped(node[YAW]) / ANGLE) + 10
+    goes = 1 if node[SPEED] > 0.15 else (2 if node[SPEED] < -0.1 else 0)
+    return ((i * 1000 + j) * 20 + turned) * 3 + goes
+
+
+@compiled
+def remaining(node: Array, aim: Array, gear: float, heading: float) -> float:
+    """[m] from a node to what is made for, and what it looks past it; `gear` is -1 for who comes backwards."""
+    dx, dy = aim[0] - node[X], aim[1] - node[Y]
+    left = math.hypot(dx, dy)
+    if left <= SETTLED:
+        return left
+    off = abs(wrapped(math.atan2(dy, dx) - node[YAW]))
+    return left + heading * (off if gear >= 0.0 else math.pi - off)
+
+
+@compiled
+def search(
+    field: Array,
+    cell: float,
+    discs: Array,
+    movers: Array,
+    aim: Array,
+    now: Array,
+    motions: Array,
+    curved: bool,
+    acceleration: Array,
+    gear: float,
+    weights: Array,
+    margins: Array,
+    step: float,
+    steps: int,
+    depth: int,
+    width: int,
+) -> tuple[int, float]:
+    """The motion to begin with, -1 if all run into something; and its cost [m].
+
+    All is in the frame of the base as it is now. `motions` (K, 2) are speeds [m/s] with turns [rad/s], or where
+    `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], and `depth` of them follow one another.
+    `margins` are the distances [m] to movers and to things below which nearness costs.
+    """
+    count = len(motions)
+    floor = min(0.0, clearances(field, cell, discs, movers[:0], 0.0, 0.0, 0.0, 0.0)[0]) - 1e-6
+    kept = np.zeros((1, 7))
+    kept[0, SPEED], kept[0, RATE] = now[0], now[2]
+    first, cost = -1, np.inf
+    for level in range(depth):
+        nodes, scores, found = np.empty((len(kept) * count, 7)), np.empty(len(kept) * count), 0
+        for i in range(len(kept)):
+            for k in range(count):
+                node = nodes[found]
+                node[:] = kept[i]
+                if level == 0:
+                    node[FIRST] = k
+                free = True
+                for s in range(steps):
+                    node[SPEED] = toward(node[SPEED], motions[k, 0], acceleration[0] * step)
+                    turn = motions[k, 1] * (node[SPEED] if curved else 1.0)
+                    node[RATE] = toward(node[RATE], turn, acceleration[2] * step)
+                    middle = node[YAW] + 0.5 * node[RATE] * step
+                    node[X] += node[SPEED] * math.cos(middle) * step
+                    node[Y] += node[SPEED] * math.sin(middle) * step
+                    node[YAW] += node[RATE] * step
+                    time = (level * steps + s + 1) * step
+                    room, apart = clearances(field, cell, discs, movers, node[X], node[Y], node[YAW], time)
+                    if room < floor:
+                        free = False
+                        break
+                    if apart < 0.0:
+                        node[SPENT] += weights[CONTACT] * step * (1.0 - apart / 0.2)
+                    elif apart < margins[0]:
+                        node[SPENT] += weights[NEAR] * step * (1.0 - apart / margins[0])
+                    if room < margins[1]:
+                        node[SPENT] += weights[TIGHT] * step * (1.0 - room / margins[1])
+                    node[SPENT] += weights[TURN] * step * abs(node[RATE])
+                if free:
+                    left = remaining(node, aim, gear, weights[HEADING])
+                    node[SPENT] += weights[LATE] * step * steps * left  # else it could as well go there later
+                    scores[found] = node[SPENT] + left
+                    found += 1
+        if found == 0:
+            break
+        order, seen = np.argsort(scores[:found]), {-1}
+        best, length = np.empty((width, 7)), 0
+        for index in order:
+            key = cell_of(nodes[index])
+            if key not in seen:
+                seen.add(key)
+                best[length] = nodes[index]
+                length += 1
+                if length == width:
+                    break
+        kept = best[:length].copy()
+        first, cost = int(kept[0, FIRST]), scores[order[0]]
+    return first, cost

@@ -1,0 +1,1 @@
+"""Benchmarks of navigation: ways through furnished rooms, on maps and in physics."""

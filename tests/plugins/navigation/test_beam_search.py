@@ -1,0 +1,90 @@
+"""The beam search: bases that turn or shunt to let somebody pass where the best single velocity does not."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from anysim.conventions import Array
+from anysim_navigation.beam_search import BeamSearch
+from anysim_navigation.dynamic_window import STEP, DynamicWindow
+from anysim_navigation.limits import BaseKind, BaseLimits
+from anysim_navigation.pose_control import in_frame
+from tests.plugins.navigation.test_local_planning import CELL, Scene, limits
+
+PASSAGE = Scene(((-3.0, -1.0, 6.0, -0.65), (-3.0, 0.65, -1.4, 2.4), (0.0, 0.65, 6.0, 2.4), (-1.4, 1.9, 0.0, 2.4)))
+"""A passage of 1.3 m, in which nobody passes a base of 0.5 m, and a bay beside it."""
+GOAL = np.array([4.0, 0.0])
+PERSON = 0.25
+Chooser = Callable[[Array, Array, Array, Array, Array], Array]
+
+
+def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
+    """[m] the least between the base and a person who comes along the passage, and what is left to the goal."""
+    pose, now, nearest = np.zeros(3), np.zeros(3), np.inf
+    person, pace = np.array([3.0, 0.0]), np.array([-0.4, 0.0])
+    for _ in range(300):
+        c, s = np.cos(pose[2]), np.sin(pose[2])
+        at = in_frame(pose, person[None])[0]
+        movers = np.array([[*at, c * pace[0] + s * pace[1], c * pace[1] - s * pace[0], PERSON]])
+        aim = in_frame(pose, (pose[:2] + np.clip(GOAL - pose[:2], -1.0, 1.0))[None])[0]
+        told = choose(PASSAGE.field(pose), aim, now, movers, pose)
+        now = now + np.clip(told - now, -made.acceleration * STEP, made.acceleration * STEP)
+        middle = pose[2] + 0.5 * now[2] * STEP
+        pose = pose + STEP * np.array([now[0] * np.cos(middle), now[0] * np.sin(middle), now[2]])
+        person = person + STEP * pace
+        nearest = min(nearest, float(np.hypot(*(person - pose[:2]))) - PERSON - 0.25)
+        assert PASSAGE.clearance(pose) > -0.01
+        if np.hypot(*(GOAL - pose[:2])) < 0.2:
+            break
+    return nearest, float(np.hypot(*(GOAL - pose[:2])))
+
+
+@pytest.mark.parametrize("kind", [BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN])
+def test_a_base_leaves_a_passage_for_who_comes_along_it_and_goes_on(kind: BaseKind) -> None:
+    made = limits(kind)._replace(low=np.array([-0.6, 0.0, -1.5]))
+    search = BeamSearch(made)
+    nearest, left = met(lambda field, aim, now, movers, _: search.choose(field, CELL, aim, now, movers)[0], made)
+    assert nearest > 0.0
+    assert left < 0.2
+
+
+def test_one_velocity_at_a_time_is_caught_there() -> None:
+    """What the test above shows is the search's doing."""
+    made = limits(BaseKind.DIFFERENTIAL)._replace(low=np.array([-0.6, 0.0, -1.5]))
+    window, last = DynamicWindow(made), np.zeros(3)
+
+    def choose(field: Array, aim: Array, now: Array, movers: Array, pose: Array) -> Array:
+        way = in_frame(pose, np.array([pose[:2], GOAL]))
+        last[:] = window.choose(field, CELL, way, aim, now, last, movers).twist
+        return last
+
+    nearest, left = met(choose, made)
+    assert nearest < 0.0 or left > 1.0
+
+
+def test_a_car_never_turns_tighter_than_it_can() -> None:
+    search, rng = BeamSearch(limits(BaseKind.ACKERMANN)), np.random.default_rng(0)
+    for _ in range(30):
+        movers = np.array([[*rng.uniform(-2, 2, 2), *rng.uniform(-0.5, 0.5, 2), 0.25]])
+        now = np.array([rng.uniform(-0.3, 0.6), 0.0, 0.0])
+        told, _ = search.choose(Scene().field(np.zeros(3)), CELL, rng.uniform(-1, 1, 2), now, movers)
+        assert abs(told[2]) <= abs(told[0]) / 0.5 + 1e-9
+
+
+def test_who_is_walled_in_stands() -> None:
+    walls = Scene(((-1.0, -1.0, 1.0, -0.26), (-1.0, 0.26, 1.0, 1.0), (0.26, -1.0, 1.0, 1.0), (-1.0, -1.0, -0.26, 1.0)))
+    search = BeamSearch(limits(BaseKind.ACKERMANN))
+    moving = np.array([0.6, 0.0, 0.0])
+    told, cost = search.choose(walls.field(np.zeros(3)), CELL, np.array([1.0, 0.0]), moving, np.zeros((0, 5)))
+    assert told[0] < moving[0]
+    assert cost == np.inf
+
+
+def test_equal_questions_have_equal_answers() -> None:
+    search = BeamSearch(limits(BaseKind.DIFFERENTIAL))
+    movers = np.array([[1.0, 0.1, -0.4, 0.0, 0.25], [0.0, 1.0, 0.1, -0.3, 0.25]])
+    asked = Scene().field(np.zeros(3)), CELL, np.array([1.0, 0.0]), np.array([0.3, 0.0, 0.1]), movers
+    first, again = search.choose(*asked), search.choose(*asked)
+    assert (first[0] == again[0]).all()
+    assert first[1] == again[1]
