@@ -79,7 +79,7 @@ class PlannedBase(Base):
         car = vehicle if isinstance(vehicle, AckermannSpec) else None  # which may be steered by its rate of turning
         kind = BaseKind.ACKERMANN if car else kind_of(self._labels, 0 if entry is None else len(entry.legs))
         shape = self.env.engine.world, self._robot.name, frame_pose(self.env.scene, self.frame)
-        discs = discs_of(*shape, 2 if car else 1, SWAY.get(kind, 0.0))  # who cannot turn on the spot needs no room to
+        discs = discs_of(*shape, 3 if car else 1, SWAY.get(kind, 0.0))  # who cannot turn on the spot needs no room to
         most, least = np.array(controller.high, dtype=float), np.array(controller.low, dtype=float)
         options: dict[str, Any] = {}
         if car:

@@ -6,7 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim_navigation.dynamic_window import STEP
-from anysim_navigation.limits import BaseLimits
+from anysim_navigation.limits import BaseKind, BaseLimits
 
 SPEEDS = (1.0, 0.5, 0.0, -1.0)
 """Of the fastest forwards and backwards."""
@@ -38,6 +38,10 @@ class Weights(NamedTuple):
     late: float = 0.05
 
 
+NEAR: dict[BaseKind, float] = {BaseKind.ACKERMANN: 1.5}
+"""What nearness costs where it is not the usual weight: a car needs longer to get out of a way."""
+
+
 class BeamSearch:
     """Velocities of a base that cannot go sideways, among movers. It remembers nothing.
 
@@ -58,7 +62,9 @@ class BeamSearch:
     ) -> None:
         """`depth` motions of `steps` ticks are looked ahead, `width` states are gone on with after each."""
         self.limits = limits
-        self._weights, self._margins = np.array(weights or Weights(), dtype=float), np.array(margins)
+        if weights is None:
+            weights = Weights(near=NEAR.get(limits.kind, Weights().near))
+        self._weights, self._margins = np.array(weights, dtype=float), np.array(margins)
         self._size = steps, depth, width
         self._curved = limits.turning_radius > 0.0
         most = 1.0 / limits.turning_radius if self._curved else float(limits.high[2])

@@ -42,8 +42,10 @@ def clearances(
         px, py = x + cosine * discs[d, 0] - sine * discs[d, 1], y + sine * discs[d, 0] + cosine * discs[d, 1]
         least = min(least, distance_at(field, cell, px, py) - 0.5 * cell - discs[d, 2])
         for m in range(len(movers)):
-            mx, my = movers[m, 0] + time * movers[m, 2], movers[m, 1] + time * movers[m, 3]
-            apart = min(apart, math.hypot(mx - px, my - py) - movers[m, 4] - discs[d, 2])
+            dx, dy = movers[m, 0] + time * movers[m, 2] - px, movers[m, 1] + time * movers[m, 3] - py
+            both = movers[m, 4] + discs[d, 2]
+            if dx * dx + dy * dy < (apart + both) * (apart + both):  # it is nearer than those before
+                apart = math.sqrt(dx * dx + dy * dy) - both
     return least, apart
 
 
