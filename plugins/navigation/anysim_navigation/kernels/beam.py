@@ -119,5 +119,5 @@ def search(
                 if length == width:
                     break
         kept = best[:length].copy()
-        first, cost = int(kept[0, FIRST]), scores[order[0]]
+        first, cost = int(kept[0, FIRST]), float(scores[order[0]])
     return first, cost
