@@ -14,7 +14,7 @@ from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from anysim_navigation.base_planner import PlannedBase
-from anysim_navigation.movers import Movers, movers_of
+from anysim_navigation.movers import STRIDE, Movers, movers_of
 from anysim_navigation.router import _roomiest
 from anysim_navigation_bench.drives import HARD, drive
 from tests.tiers import others
@@ -105,6 +105,21 @@ def test_who_stands_is_on_the_map_and_who_moves_is_not() -> None:
         assert movers.there(0, standing=True).sum() == len(env.engine.world.entities) - 1
 
 
+def test_people_take_the_room_that_their_feet_take_beside_a_low_base() -> None:
+    with crossing("null", {"planner": "dynamic_window"}) as env:
+        env.reset(seed=1)
+        for _ in range(80):
+            env.step(np.zeros((1, 3)))
+        env.scene.look(None)
+        before, behind = Movers(env.scene, ["ann"], 0.3).around(np.array([0]), np.zeros((1, 3)))[0]
+        speed = np.hypot(*before[2:4])
+        assert np.allclose(before[2:], behind[2:])
+        assert speed > 0.4
+        assert np.allclose(before[:2] - behind[:2], 2 * STRIDE * before[2:4])
+        tall, _ = Movers(env.scene, ["ann"], 1.3).around(np.array([0]), np.zeros((1, 3)))[0]
+        assert 0.15 < before[4] < 0.3 < tall[4] < 0.45
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("to", [1.6, 0.0])
 def test_a_base_gets_past_a_person_who_crosses_its_way_or_stops_on_it(to: float) -> None:
@@ -152,3 +167,18 @@ def test_a_room_is_crossed_among_four_people(engine: str) -> None:
     found = drive(1, "holonomic_base", engine, people=4)
     assert found is not None
     assert (found.ended, found.met != "towards") == ("success", True)
+
+
+@pytest.mark.parametrize(
+    ("base", "room"),  # in each of which the best single velocity was caught
+    [
+        pytest.param("differential_base", 8, marks=pytest.mark.slow),
+        pytest.param("differential_base", 12, marks=pytest.mark.full),
+        pytest.param("ackermann_base", 5, marks=pytest.mark.full),
+    ],
+)
+def test_who_cannot_go_aside_gives_way_to_people_and_gets_through(base: str, room: int) -> None:
+    require_engine("mujoco")
+    found = drive(room, base, "mujoco", people=4)
+    assert found is not None
+    assert (found.ended, found.met) == ("success", "")
