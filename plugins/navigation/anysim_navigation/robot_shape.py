@@ -25,11 +25,14 @@ def discs_of(world: World, robot: str, frame_pose: Array, least: int = 1, sway: 
 
 
 def outline_of(world: World, entity: str, frame_pose: Array, top: float = inf) -> Array:
-    """(K, 2) [m] points around what of an entity, as it begins, is below a height: around all of it if nothing is."""
+    """(K, 2) [m] points around what of an entity, as it begins, is below a height: around all of it if nothing is.
+
+    They are in its frame at a pose (7,), and that alone where nothing of it collides.
+    """
     found = world.entities[world.entity_numbers[entity]]
     others = {-1, *range(found.body_start), *range(found.body_stop, len(world.bodies))}
     band = (footprints(world, world.initial_body_pose, heights, others) for heights in ((STEP, top), (-inf, inf)))
-    outlines = np.concatenate(next(each for each in band if each))
+    outlines = np.concatenate(next((each for each in band if each), [frame_pose[None, :2]]))
     off = np.concatenate([outlines - frame_pose[:2], np.zeros((len(outlines), 1))], axis=1)
     half = 0.5 * P.yaw(frame_pose[3:])
     level = np.array([0.0, 0.0, np.sin(half), np.cos(half)])

@@ -13,7 +13,7 @@ from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
 from anysim_navigation.limits import SWAY, BaseKind, BaseLimits, discs_over, kind_of, limits_of, output_of
 from anysim_navigation.pose_control import PoseControl, in_frame
 from anysim_navigation.progress import OFF, PATIENCE, RECOVERY, Progress
-from anysim_navigation.robot_shape import discs_of
+from anysim_navigation.robot_shape import discs_of, outline_of
 from anysim_navigation.router import ROOM
 
 CELL, SIDE = 0.05, 120
@@ -293,3 +293,9 @@ def test_a_walk_takes_its_sway_as_well() -> None:
     wide = [discs_of(world, "g1", at, sway=sway) for sway in (0.0, SWAY[BaseKind.HUMANOID])]
     narrow, swaying = (float((np.abs(discs[:, 1]) + discs[:, 2]).max()) for discs in wide)
     assert swaying - narrow > 0.9 * SWAY[BaseKind.HUMANOID]
+
+
+def test_what_touches_nothing_takes_no_room() -> None:
+    world = compile_world({"world": {"objects": {"eye": {"source": {"procedural": "camera_body"}, "fixed": True}}}})
+    at = world.initial_body_pose[world.entities[world.entity_numbers["eye"]].root]
+    assert np.allclose(outline_of(world, "eye", at, 0.3), [[0.0, 0.0]])
