@@ -14,8 +14,6 @@ TURNS = (-1.0, -0.4, 0.0, 0.4, 1.0)
 """Of the fastest turn, or of the tightest curve."""
 WINDOW = 0.35
 """[s] of acceleration by which what is told may differ from what is."""
-WITHIN = 4.5
-"""[m] movers beyond it are not looked at."""
 
 
 class Weights(NamedTuple):
@@ -83,12 +81,11 @@ class BeamSearch:
         from anysim_navigation.kernels import beam
 
         limits, (steps, depth, width) = self.limits, self._size
-        close = np.ascontiguousarray(movers[np.hypot(movers[:, 0], movers[:, 1]) < WITHIN])
         first, cost = beam.search(
             field,
             float(cell),
             limits.discs,
-            close,
+            np.ascontiguousarray(movers),
             np.array(aim, dtype=float),
             np.array(now, dtype=float),
             self._motions,

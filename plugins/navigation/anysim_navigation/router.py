@@ -16,7 +16,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.scene import Frame, RobotView, SceneView
 from anysim_navigation.agent import NoRoute
-from anysim_navigation.beam_search import WITHIN, BeamSearch
+from anysim_navigation.beam_search import BeamSearch
 from anysim_navigation.car_ways import car_way
 from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
 from anysim_navigation.limits import SWAY, BaseKind, BaseLimits
@@ -44,6 +44,8 @@ NEARER = 0.1
 """[m] of the way that count as nearer."""
 SEARCHING = (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN)
 """Who cannot go aside, and among movers searches for several velocities in a row."""
+WITHIN = 4.5
+"""[m] from it, movers are looked at by a search."""
 FREE, AWHILE = 0.9, 2.0
 """[m] nobody comes nearer than that, for so many seconds [s], where a base goes straight to its end among movers."""
 SNAP = 0.6
@@ -255,7 +257,8 @@ class BaseRouter:
         if car and float(np.hypot(*(end - pose[:2]))) < CAR_STOPS:
             self.mode[env], self.twist[env] = Mode.STAND, 0.0  # it cannot turn on the spot, so there is nothing to do
             return
-        searching = self.search is not None and bool((np.hypot(movers[:, 0], movers[:, 1]) < WITHIN).any())
+        close = movers[np.hypot(movers[:, 0], movers[:, 1]) < WITHIN]
+        searching = self.search is not None and len(close) > 0
         alone = not searching or _is_free(movers)
         if progress.left < NEAR and not car and alone and self._straight(field, pose, end):
             self.mode[env] = Mode.DIRECT
@@ -271,7 +274,7 @@ class BaseRouter:
         gear = float(self._gear[env])
         if searching:
             assert self.search is not None
-            self.twist[env], _ = self.search.choose(field, cell, aim, now, movers, gear)
+            self.twist[env], _ = self.search.choose(field, cell, aim, now, close, gear)
             return
         if progress.recovering > 0:
             aim, gear = _roomiest(field, cell, movers), 0.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math.compiled import compiled
-from anysim_navigation.kernels.window import SETTLED, clearances, toward
+from anysim_navigation.kernels.window import SETTLED, clearances, looks_past, toward
 
 CONTACT, NEAR, TIGHT, TURN, HEADING, LATE = range(6)
 """Places of the weights."""
@@ -17,16 +17,11 @@ PLACE, ANGLE = 0.12, 0.4
 
 
 @compiled
-def wrapped(angle: float) -> float:
-    """An angle within half a turn."""
-    return math.atan2(math.sin(angle), math.cos(angle))
-
-
-@compiled
 def cell_of(node: Array) -> int:
     """What nodes have in common of which the better one is enough."""
     i, j = math.floor(node[X] / PLACE) + 500, math.floor(node[Y] / PLACE) + 500
-    turned = math.floor(wrapped(node[YAW]) / ANGLE) + 10
+    yaw = math.atan2(math.sin(node[YAW]), math.cos(node[YAW]))
+    turned = math.floor(yaw / ANGLE) + 10
     goes = 1 if node[SPEED] > 0.15 else (2 if node[SPEED] < -0.1 else 0)
     return ((i * 1000 + j) * 20 + turned) * 3 + goes
 
@@ -34,11 +29,10 @@ def cell_of(node: Array) -> int:
 @compiled
 def remaining(node: Array, aim: Array, gear: float, heading: float) -> float:
     """[m] from a node to what is made for, and what it looks past it; `gear` is -1 for who comes backwards."""
-    dx, dy = aim[0] - node[X], aim[1] - node[Y]
-    left = math.hypot(dx, dy)
+    left = math.hypot(aim[0] - node[X], aim[1] - node[Y])
     if left <= SETTLED:
         return left
-    off = abs(wrapped(math.atan2(dy, dx) - node[YAW]))
+    off = looks_past(aim, node[X], node[Y], node[YAW])
     return left + heading * (off if gear >= 0.0 else math.pi - off)
 
 

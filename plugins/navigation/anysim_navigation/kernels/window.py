@@ -74,6 +74,13 @@ def distance_to_path(path: Array, x: float, y: float) -> float:
 
 
 @compiled
+def looks_past(aim: Array, x: float, y: float, yaw: float) -> float:
+    """[rad] between where a pose looks and a point, from 0 to half a turn."""
+    off = math.atan2(aim[1] - y, aim[0] - x) - yaw
+    return abs(math.atan2(math.sin(off), math.cos(off)))
+
+
+@compiled
 def toward(now: float, wanted: float, most: float) -> float:
     """A value as near to the wanted one as it gets by `most`."""
     return now + min(most, max(-most, wanted - now))
@@ -164,12 +171,7 @@ def choose(
                 left = math.hypot(aim[0] - x, aim[1] - y)
                 off = 0.0
                 if left > SETTLED:
-                    off = abs(
-                        math.atan2(
-                            math.sin(math.atan2(aim[1] - y, aim[0] - x) - yaw),
-                            math.cos(math.atan2(aim[1] - y, aim[0] - x) - yaw),
-                        )
-                    )
+                    off = looks_past(aim, x, y, yaw)
                 if turning_radius > 0.0 and forward < 0.0:
                     off = math.pi - off  # a car that goes backwards looks away from where it goes
                 flips = (1.0 if turn * last[2] < -0.01 else 0.0) + (1.0 if forward * last[0] < -1e-3 else 0.0)
