@@ -43,13 +43,15 @@ class Avatars(Family):
         assert isinstance(spec, AvatarSpec)
         for number, one in enumerate(people(spec)):
             gait, legs = _gait(1), Legs.of([one], 1)
-            gait.pos[0], gait.yaw[0] = _begin(spec, number), float(nominal(spec.yaw))
+            own = spec.one(number)
+            gait.pos[0] = float(nominal(own.x)), float(nominal(own.y)) + _aside(spec, number)
+            gait.yaw[0] = float(nominal(own.yaw))
             stand(gait, legs, np.zeros((1, 2)))
-            first = spec.do[0] if spec.do else ActionSpec()
+            first = own.do[0] if own.do else ActionSpec()
             posture = _first(first.clip or "", np.array([first.seat]), legs)
             gait.hips[:] -= posture[:, clips.DROP]
             poses = figure(gait, Sizes.of([one], 1), _aim(posture)).poses[0]
-            called = name if spec.count == 1 else f"{name}_{number}"
+            called = name if spec.number == 1 else f"{name}_{number}"
             shown = shapes(one) if spec.look == "body" else None
             yield FamilyPart(called, bodies.model(called, one, poses, shown), "person", driven=True)
 
@@ -62,7 +64,7 @@ class Avatars(Family):
         world = setting.engine.world
         entities = [world.entities[i] for i in setting.entities]
         self.names = tuple(entity.name for entity in entities)
-        self.people, count = people(setting.spec), setting.spec.count
+        self.people, count = people(setting.spec), setting.spec.number
         self._every_leg = Legs.of(self.people, setting.engine.num_envs)
         self._every_size = Sizes.of(self.people, setting.engine.num_envs)
         self._capsules = [bodies.segments(one) for one in self.people]
@@ -104,8 +106,15 @@ class Avatars(Family):
         self.remember("queue", count, LENGTH, WIDTH)
         self._points = self.remember("points", count * len(BONES), 3)
         self._speeds = self.remember("speeds", count * len(BONES), 3)
-        self._script = self._rows(setting.spec.do, f"world.families.{setting.name}.do")
-        self._drawn = list(_drawn(setting.spec.do, self.body, self.clip_number))
+        scripts = [setting.spec.one(number).do for number in range(count)]
+        paths = [self._path(number, "do") for number in range(count)]
+        self._script = np.array([self._rows(*each) for each in zip(scripts, paths, strict=True)])
+        self._drawn = [(i, *each) for i, do in enumerate(scripts) for each in _drawn(do, self.body, self.clip_number)]
+
+    def _path(self, number: int, key: str) -> str:
+        """Where a key is said that holds for one of them."""
+        own = getattr(self.spec_.own(number), key) is not None
+        return f"world.families.{self.setting.name}.{f'each.{number}.' if own else ''}{key}"
 
     def _read(self, clip: str, file: str) -> Motion:
         path = f"world.families.{self.setting.name}.motions.{clip}"
@@ -167,37 +176,41 @@ class Avatars(Family):
     # ------------------------------------------------------------------ its life
 
     def reset(self, env_ids: Array) -> None:
-        spec, streams, memory = self.spec_, self.setting.streams, self.memory
-        path = f"world.families.{self.setting.name}"
-        for number in range(spec.count):
-            for column, key in enumerate(("x", "y")):
-                value = getattr(spec, key)
-                stream = f"family/{self.setting.name}/{number}/{key}"
-                drawn = draw_rows(value, stream, streams, env_ids, source=f"{path}.{key}")
-                row = 0.0 if is_random(value) else _begin(spec, number)[column] - value
-                memory["pos"][env_ids, number, column] = drawn + row + self.setting.origin[env_ids, column]
-            stream = f"family/{self.setting.name}/{number}/yaw"
-            memory["yaw"][env_ids, number] = draw_rows(spec.yaw, stream, streams, env_ids, source=f"{path}.yaw")
+        spec, memory = self.spec_, self.memory
+        for number in range(spec.number):
+            own = spec.one(number)
+            for column, (key, value) in enumerate((("x", own.x), ("y", own.y))):
+                beside = 0.0 if column == 0 or is_random(value) else _aside(spec, number)
+                drawn = self._values(number, key, value, env_ids)
+                memory["pos"][env_ids, number, column] = drawn + beside + self.setting.origin[env_ids, column]
+            memory["yaw"][env_ids, number] = self._values(number, "yaw", own.yaw, env_ids)
         memory["queue"][env_ids] = self._script
-        for row, columns, key, value in self._drawn:
-            for number in range(spec.count):
-                stream = f"family/{self.setting.name}/{number}/do/{key}"
-                drawn = draw_rows(value, stream, streams, env_ids, source=f"{path}.do.{key}")
-                memory["queue"][env_ids, number, row, columns] = drawn.reshape(len(env_ids), -1)
+        for number, row, columns, key, value in self._drawn:
+            drawn = self._values(number, key, value, env_ids, "do")
+            memory["queue"][env_ids, number, row, columns] = drawn.reshape(len(env_ids), -1)
         gait, legs, sizes = self._gait(env_ids), self._legs(env_ids), self._sizes(env_ids)
         stand(gait, legs, self._ground(gait.feet[:, :, :2] + gait.pos[:, None]))
         self._begin_as_told(env_ids, gait, legs, sizes)
+
+    def _values(self, number: int, key: str, value: object, env_ids: Array, under: str = "") -> Array:
+        """(n, …) a value of one of them in the episodes of these envs."""
+        stream = "/".join(part for part in ("family", self.setting.name, str(number), under, key) if part)
+        path = f"{self._path(number, under)}.{key}" if under else self._path(number, key)
+        return draw_rows(value, stream, self.setting.streams, env_ids, source=path)
 
     def _begin_as_told(self, env_ids: Array, gait: Gait, legs: Legs, sizes: Sizes) -> None:
         """They hold the clip, gaze, reach and bend of their first action when an episode begins."""
         rows = len(gait.pos)
         first = self._take(env_ids, "queue")[:, 0]
-        clip = self._clips[int(first[0, Column.CLIP])] if first[0, Column.KIND] == Kind.CLIP else ""
-        posture = _first(clip, first[:, Column.SEAT], legs)
+        plays = np.where(first[:, Column.KIND] == Kind.CLIP, first[:, Column.CLIP], -1).astype(np.int64)
+        posture = _first("", first[:, Column.SEAT], legs)
+        for number in np.unique(plays[(plays >= 0) & (plays < len(clips.CLIPS))]):
+            mine = plays == number
+            seats, theirs = first[mine, Column.SEAT], Legs(*(values[mine] for values in legs))
+            posture[mine] = _first(self._clips[number], seats, theirs)
         gait.hips[:] -= posture[:, clips.DROP]
         now = {"posture": posture, "before": posture, "fade": np.full(rows, FADE), "bend": first[:, Column.BEND]}
-        if clip in clips.CLIPS:
-            now["playing"] = np.full(rows, self.clip_number(clip))
+        now["playing"] = np.where((plays >= 0) & (plays < len(clips.CLIPS)), plays, 0)
         scene = self._scene(env_ids)
         now["gazing"], now["gaze"] = first[:, Column.GAZING], _points(scene, first, Column.GAZE_BODY, Column.GAZE)
         hand = first[:, Column.HAND].astype(int)
@@ -449,7 +462,7 @@ _FREE = (
 def people(spec: AvatarSpec) -> list[Proportions]:
     """The avatars of a spec, as its seed makes them."""
     found: list[Proportions] = []
-    for number in range(spec.count):
+    for number in range(spec.number):
         rng = np.random.default_rng([spec.seed, number])
         tall = float(draw_one(spec.height, rng.random) if is_random(spec.height) else nominal(spec.height))
         found.append(proportions(tall, rng))
@@ -484,9 +497,9 @@ def _onward(point: Array, target: Array, most: Array, share: Array) -> Array:
     return np.where((share > 0.0)[:, None], point + gap * (step / np.maximum(far, 1e-12))[:, None], target)
 
 
-def _begin(spec: AvatarSpec, number: int) -> tuple[float, float]:
-    """Where an avatar stands in the World, before anything is drawn."""
-    return float(nominal(spec.x)), float(nominal(spec.y)) + ROW * number
+def _aside(spec: AvatarSpec, number: int) -> float:
+    """[m] to the left of where all begin, if it is not said of this one."""
+    return 0.0 if spec.own(number).y is not None else ROW * number
 
 
 def _gait(rows: int) -> Gait:

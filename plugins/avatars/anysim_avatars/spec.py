@@ -51,6 +51,15 @@ class ActionSpec(Spec):
         return self
 
 
+class PersonSpec(Spec):
+    """What one of several avatars has of its own."""
+
+    x: FloatValue | None = Field(default=None, description="where it begins [m]")
+    y: FloatValue | None = Field(default=None, description="where it begins [m]")
+    yaw: FloatValue | None = Field(default=None, description="where it faces [rad]")
+    do: tuple[ActionSpec, ...] | None = Field(default=None, description="what it does, one after another")
+
+
 class AvatarSpec(Spec):
     """One avatar, or several that are drawn by one seed."""
 
@@ -66,7 +75,24 @@ class AvatarSpec(Spec):
     )
     yaw: FloatValue = Field(default=0.0, description="where it faces [rad]")
     do: tuple[ActionSpec, ...] = Field(default=(), description="what it does, one after another; then it stands")
+    each: tuple[PersonSpec, ...] = Field(
+        default=(), max_length=32, description="what the first ones have in place of that; there are at least as many"
+    )
     again: Flag = Field(default=False, description="begin anew after the last")
     motions: dict[Name, str] = Field(
         default_factory=dict, description="recordings by name: BVH files, whose clips these are"
     )
+
+    @property
+    def number(self) -> int:
+        """How many there are."""
+        return max(self.count, len(self.each))
+
+    def own(self, number: int) -> PersonSpec:
+        """What one of them has of its own."""
+        return self.each[number] if number < len(self.each) else PersonSpec()
+
+    def one(self, number: int) -> Self:
+        """What one of them begins with and does."""
+        own = {key: value for key, value in self.own(number) if value is not None}
+        return self.model_copy(update=own)

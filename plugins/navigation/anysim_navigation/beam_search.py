@@ -38,10 +38,7 @@ class Weights(NamedTuple):
     late: float = 0.05
 
 
-USUAL: dict[BaseKind, Weights] = {
-    BaseKind.ACKERMANN: Weights(near=1.5),
-    BaseKind.HOLONOMIC: Weights(heading=0.0),
-}
+USUAL: dict[BaseKind, Weights] = {BaseKind.ACKERMANN: Weights(near=1.5), BaseKind.HOLONOMIC: Weights(heading=0.0)}
 """Of kinds that differ: a car needs longer to get out of a way; who goes sideways need not look ahead."""
 
 

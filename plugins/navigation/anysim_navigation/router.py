@@ -34,10 +34,10 @@ ROOM = (0.12, 0.06, 0.04, 0.02)
 """[m] beyond its radius that ways keep from things: as much as makes following them easy, else what fits."""
 NEAR = 0.35
 """[m] from its end a way is left for the straight line, if that is free."""
-CAR_STOPS = 0.15
-"""[m] from its end a car has arrived: its heading there is that of the way."""
+CAR_STOPS, STOPS_AMONG = 0.15, 0.22
+"""[m] from its end a car has arrived: its heading there is that of the way. Among movers it need not come as near."""
 CUSP, AMONG = 0.05, 0.15
-"""[m] before it changes its direction a car may do so; among movers it need not come as near."""
+"""[m] before it changes its direction a car may do so, likewise."""
 REPLANS = 12
 """Ways in a row that did not bring a base nearer to its end before it gives up; a quarter where nobody moves."""
 NEARER = 0.1
@@ -254,11 +254,11 @@ class BaseRouter:
         assert progress is not None
         cell, end = self._grid.cell, self.target[env, :2]
         car = self.limits.kind is BaseKind.ACKERMANN
-        if car and float(np.hypot(*(end - pose[:2]))) < CAR_STOPS:
-            self.mode[env], self.twist[env] = Mode.STAND, 0.0  # it cannot turn on the spot, so there is nothing to do
-            return
         close = movers[np.hypot(movers[:, 0], movers[:, 1]) < WITHIN]
         searching = self.search is not None and len(close) > 0
+        if car and float(np.hypot(*(end - pose[:2]))) < (STOPS_AMONG if searching else CAR_STOPS):
+            self.mode[env], self.twist[env] = Mode.STAND, 0.0  # it cannot turn on the spot, so there is nothing to do
+            return
         alone = not searching or _is_free(movers)
         if progress.left < NEAR and not car and alone and self._straight(field, pose, end):
             self.mode[env] = Mode.DIRECT

@@ -118,8 +118,8 @@ def drive(
     task = _task(seed, world, robot, how, start, goal, yaws, planner)
     if people:
         walks = NavMaps(world, Agent(0.3, 1.9), area=box).at()
-        task["world"]["families"] = _people(people, walks, start, np.random.default_rng([seed, 2]))
-        for name in task["world"]["families"]:
+        task["world"]["families"] = {"person": _people(people, walks, start, np.random.default_rng([seed, 2]))}
+        for name in ["person"] if people == 1 else [f"person_{number}" for number in range(people)]:
             task["world"]["contact_sensors"][f"met_{name}"] = {"body": name, "against": "base"}
             task["task"]["failure"][f"met_{name}"] = {**HIT, "sensor": f"met_{name}"}
     with make(task, engine=engine, num_envs=1) as env:
@@ -142,9 +142,9 @@ def _ends(mesh: NavMesh, rng: np.random.Generator, size: list[float]) -> tuple[A
 
 def _people(count: int, mesh: NavMesh, start: Array, rng: np.random.Generator) -> dict[str, Any]:
     """Avatars that walk around furniture between random points, and begin away from the base."""
-    made: dict[str, Any] = {}
+    each: list[dict[str, Any]] = []
     pairs = iter(free_pairs(mesh, 40 * count, rng).reshape(-1, 2))
-    while len(made) < count:
+    while len(each) < count:
         begin = here = next(pairs)
         if np.hypot(*(begin - start)) < PEOPLE_APART:
             continue
@@ -158,15 +158,9 @@ def _people(count: int, mesh: NavMesh, start: Array, rng: np.random.Generator) -
                 points, here = [*points, *stretch], target
         walk = [[round(float(v), 3) for v in point] for point in points]
         speed = round(float(rng.uniform(*PACES)), 3)
-        made[f"person_{len(made)}"] = {
-            "kind": "avatar",
-            "seed": int(rng.integers(1000)),
-            "x": round(float(begin[0]), 3),
-            "y": round(float(begin[1]), 3),
-            "do": [{"path": walk[k : k + 16], "speed": speed} for k in range(0, len(walk), 16)],
-            "again": True,
-        }
-    return made
+        do = [{"path": walk[k : k + 16], "speed": speed} for k in range(0, len(walk), 16)]
+        each.append({"x": round(float(begin[0]), 3), "y": round(float(begin[1]), 3), "do": do})
+    return {"kind": "avatar", "seed": int(rng.integers(1000)), "each": each, "again": True}
 
 
 def _task(

@@ -93,6 +93,21 @@ def test_actions_follow_one_another_and_begin_anew():
     assert seen == ["talk", "wave", "talk", "wave"]
 
 
+def test_each_begins_where_it_is_told_and_does_what_only_it_is_told():
+    """As one avatar that is told the same; who is told nothing of its own stands in the row of all."""
+    walk = [{"path": [[1.0, 1.0], [0.0, 2.0]], "speed": 0.8}]
+    seat = {"x": {"range": [1.0, 2.0]}, "y": -1.0, "yaw": 0.5, "do": ["sit"]}
+    with after(run_of(["talk"], count=3, seed=5, each=[{"do": walk}, seat]), 80, seed=3) as (env, family):
+        assert [family.facts(0)[f"ann_{i}"]["doing"] for i in range(3)] == ["walk", "sit", "talk"]
+        assert family.memory["pos"][0, 2].tolist() == [0.0, 1.8]
+        x, y = family.memory["pos"][0, 1]
+        assert 1.0 < x < 2.0
+        assert (y, family.memory["yaw"][0, 1]) == (-1.0, 0.5)
+        walked = env.engine.get_state().body_pose[0, family.engine.world.entities[0].root].copy()
+    with after(run_of(walk, seed=5), 80, seed=3) as (env, family):
+        assert (env.engine.get_state().body_pose[0, family.engine.world.entities[0].root] == walked).all()
+
+
 def test_what_is_asked_for_later_is_done_in_those_envs():
     with anysim.make(run_of(["idle"], num_envs=2)) as env:
         env.reset(seed=0)
@@ -122,6 +137,8 @@ def test_what_is_asked_for_later_is_done_in_those_envs():
 def test_a_wrong_action_is_told_at_its_place(do, words):
     with pytest.raises(SpecError, match=words):
         anysim.make(run_of(do))
+    with pytest.raises(SpecError, match=words.replace(r"do\.0", r"each\.1\.do\.0")):
+        anysim.make(run_of(["idle"], each=[{}, {"do": do}]))
 
 
 def test_seeds_make_people_that_differ():
