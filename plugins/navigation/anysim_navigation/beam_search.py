@@ -12,8 +12,6 @@ SPEEDS = (1.0, 0.5, 0.0, -1.0)
 """Of the fastest forwards and backwards."""
 TURNS = (-1.0, -0.4, 0.0, 0.4, 1.0)
 """Of the fastest turn, or of the tightest curve."""
-DIRECTIONS = 12
-"""In which a base goes that need not turn, with the positive of these speeds."""
 WINDOW = 0.35
 """[s] of acceleration by which what is told may differ from what is."""
 
@@ -38,12 +36,12 @@ class Weights(NamedTuple):
     late: float = 0.05
 
 
-USUAL: dict[BaseKind, Weights] = {BaseKind.ACKERMANN: Weights(near=1.5), BaseKind.HOLONOMIC: Weights(heading=0.0)}
-"""Of kinds that differ: a car needs longer to get out of a way; who goes sideways need not look ahead."""
+NEAR: dict[BaseKind, float] = {BaseKind.ACKERMANN: 1.5}
+"""What nearness costs where it is not the usual weight: a car needs longer to get out of a way."""
 
 
 class BeamSearch:
-    """Velocities of a base on wheels among movers. It remembers nothing.
+    """Velocities of a base that cannot go sideways, among movers. It remembers nothing.
 
     The dynamic window holds one velocity for the time that it looks ahead. Who has to turn first, or to shunt, needs
     several in a row to let somebody pass: here motions of half a second follow one another, and of all that they lead
@@ -63,11 +61,15 @@ class BeamSearch:
         """`depth` motions of `steps` ticks are looked ahead, `width` states are gone on with after each."""
         self.limits = limits
         if weights is None:
-            weights = USUAL.get(limits.kind, Weights())
+            weights = Weights(near=NEAR.get(limits.kind, Weights().near))
         self._weights, self._margins = np.array(weights, dtype=float), np.array(margins)
         self._size = steps, depth, width
         self._curved = limits.turning_radius > 0.0
-        self._motions = _motions(limits)
+        most = 1.0 / limits.turning_radius if self._curved else float(limits.high[2])
+        speeds = [share * float(limits.high[0] if share >= 0 else -limits.low[0]) for share in SPEEDS]
+        self._motions = np.array(
+            [(v, most * turn) for v in speeds for turn in (TURNS if v or not self._curved else (0.0,))]
+        )
 
     def choose(
         self, field: Array, cell: float, aim: Array, now: Array, movers: Array, gear: float = 0.0
@@ -97,22 +99,10 @@ class BeamSearch:
             depth,
             width,
         )
-        motion = self._motions[first] if first >= 0 else np.zeros(3)
+        speed, turn = self._motions[first] if first >= 0 else (0.0, 0.0)
         most = limits.acceleration * WINDOW
-        told = np.clip(now + np.clip(motion - now, -most, most), limits.low, limits.high)
+        told = now + np.clip(np.array([speed, 0.0, turn]) - now, -most, most)
+        told[1] = 0.0
         if self._curved:
-            told[2] = motion[2] * told[0]
+            told[2] = turn * told[0]
         return told, cost
-
-
-def _motions(limits: BaseLimits) -> Array:
-    """(K, 3) forward and aside [m/s] with a turn [rad/s], of a car with a curvature [1/m]."""
-    if limits.kind is BaseKind.HOLONOMIC:
-        turn = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-        ways = np.stack([np.cos(turn), np.sin(turn), np.zeros(DIRECTIONS)], axis=1)
-        ways *= np.where(ways > 0, limits.high, -limits.low)
-        return np.concatenate([*(share * ways for share in SPEEDS if share > 0), np.zeros((1, 3))])
-    curved = limits.turning_radius > 0.0
-    most = 1.0 / limits.turning_radius if curved else float(limits.high[2])
-    speeds = [share * float(limits.high[0] if share >= 0 else -limits.low[0]) for share in SPEEDS]
-    return np.array([(v, 0.0, most * turn) for v in speeds for turn in (TURNS if v or not curved else (0.0,))])

@@ -42,8 +42,10 @@ REPLANS = 12
 """Ways in a row that did not bring a base nearer to its end before it gives up; a quarter where nobody moves."""
 NEARER = 0.1
 """[m] of the way that count as nearer."""
-SEARCHING = (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN, BaseKind.HOLONOMIC)
-"""Who searches for several velocities in a row among movers: what is on wheels."""
+SEARCHING = (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN)
+"""Who cannot go aside, and among movers searches for several velocities in a row."""
+APART = 0.12
+"""[m] more that others keep from movers: with one velocity at a time they learn late that these turn."""
 WITHIN = 4.5
 """[m] from it, movers are looked at by a search."""
 FREE, AWHILE = 0.9, 2.0
@@ -279,7 +281,8 @@ class BaseRouter:
         if progress.recovering > 0:
             aim, gear = _roomiest(field, cell, movers), 0.0
             path = aim[None]
-        choice = self.window.choose(field, cell, path, aim, now, self.twist[env], movers, gear)
+        wider = movers + np.array([0.0, 0.0, 0.0, 0.0, APART])
+        choice = self.window.choose(field, cell, path, aim, now, self.twist[env], wider, gear)
         self.twist[env] = choice.twist
         if self.limits.kind in (BaseKind.DIFFERENTIAL,) and np.isfinite(choice.cost) and not choice.twist.any():
             bearing = float(np.arctan2(aim[1], aim[0]))

@@ -31,8 +31,7 @@ def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
         told = choose(PASSAGE.field(pose), aim, now, movers, pose)
         now = now + np.clip(told - now, -made.acceleration * STEP, made.acceleration * STEP)
         middle = pose[2] + 0.5 * now[2] * STEP
-        cosine, sine = np.cos(middle), np.sin(middle)
-        pose = pose + STEP * np.array([now[0] * cosine - now[1] * sine, now[0] * sine + now[1] * cosine, now[2]])
+        pose = pose + STEP * np.array([now[0] * np.cos(middle), now[0] * np.sin(middle), now[2]])
         person = person + STEP * pace
         nearest = min(nearest, float(np.hypot(*(person - pose[:2]))) - PERSON - 0.25)
         assert PASSAGE.clearance(pose) > 0.01  # of the 2 cm that motions keep
@@ -41,10 +40,9 @@ def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
     return nearest, float(np.hypot(*(GOAL - pose[:2])))
 
 
-@pytest.mark.parametrize("kind", [BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN, BaseKind.HOLONOMIC])
+@pytest.mark.parametrize("kind", [BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN])
 def test_a_base_leaves_a_passage_for_who_comes_along_it_and_goes_on(kind: BaseKind) -> None:
-    made = limits(kind)
-    made.low[0] = -made.high[0]
+    made = limits(kind)._replace(low=np.array([-0.6, 0.0, -1.5]))
     search = BeamSearch(made)
     nearest, left = met(lambda field, aim, now, movers, _: search.choose(field, CELL, aim, now, movers)[0], made)
     assert nearest > 0.0

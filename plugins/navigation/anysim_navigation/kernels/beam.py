@@ -10,10 +10,10 @@ from anysim_navigation.kernels.window import SETTLED, clearances, looks_past, to
 
 CONTACT, NEAR, TIGHT, TURN, HEADING, LATE = range(6)
 """Places of the weights."""
-X, Y, YAW, SPEED, ASIDE, RATE, SPENT, FIRST = range(8)
+X, Y, YAW, SPEED, RATE, SPENT, FIRST = range(7)
 """Columns of a node: where it is, how fast, what its motions have cost, and the first of them."""
 PLACE, ANGLE = 0.12, 0.4
-"""[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all, and likewise aside."""
+"""[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all."""
 KEPT = 0.02
 """[m] that motions keep from things, by which what is told and what is done may differ."""
 
@@ -25,8 +25,7 @@ def cell_of(node: Array) -> int:
     yaw = math.atan2(math.sin(node[YAW]), math.cos(node[YAW]))
     turned = math.floor(yaw / ANGLE) + 10
     goes = 1 if node[SPEED] > 0.15 else (2 if node[SPEED] < -0.1 else 0)
-    aside = 1 if node[ASIDE] > 0.15 else (2 if node[ASIDE] < -0.15 else 0)
-    return (((i * 1000 + j) * 20 + turned) * 3 + goes) * 3 + aside
+    return ((i * 1000 + j) * 20 + turned) * 3 + goes
 
 
 @compiled
@@ -60,18 +59,17 @@ def search(
 ) -> tuple[int, float]:
     """The motion to begin with, -1 if all run into something; and its cost [m].
 
-    All is in the frame of the base as it is now. `motions` (K, 3) are speeds forward and aside [m/s] with turns
-    [rad/s], or where `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], and `depth` of them
-    follow one another.
+    All is in the frame of the base as it is now. `motions` (K, 2) are speeds [m/s] with turns [rad/s], or where
+    `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], and `depth` of them follow one another.
     `margins` are the distances [m] to movers and to things below which nearness costs.
     """
     count = len(motions)
     floor = min(KEPT, clearances(field, cell, discs, movers[:0], 0.0, 0.0, 0.0, 0.0)[0]) - 1e-6
-    kept = np.zeros((1, 8))
-    kept[0, SPEED], kept[0, ASIDE], kept[0, RATE] = now
+    kept = np.zeros((1, 7))
+    kept[0, SPEED], kept[0, RATE] = now[0], now[2]
     first, cost = -1, np.inf
     for level in range(depth):
-        nodes, scores, found = np.empty((len(kept) * count, 8)), np.empty(len(kept) * count), 0
+        nodes, scores, found = np.empty((len(kept) * count, 7)), np.empty(len(kept) * count), 0
         for i in range(len(kept)):
             for k in range(count):
                 node = nodes[found]
@@ -81,13 +79,11 @@ def search(
                 free = True
                 for s in range(steps):
                     node[SPEED] = toward(node[SPEED], motions[k, 0], acceleration[0] * step)
-                    node[ASIDE] = toward(node[ASIDE], motions[k, 1], acceleration[1] * step)
-                    turn = motions[k, 2] * (node[SPEED] if curved else 1.0)
+                    turn = motions[k, 1] * (node[SPEED] if curved else 1.0)
                     node[RATE] = toward(node[RATE], turn, acceleration[2] * step)
                     middle = node[YAW] + 0.5 * node[RATE] * step
-                    cosine, sine = math.cos(middle), math.sin(middle)
-                    node[X] += (node[SPEED] * cosine - node[ASIDE] * sine) * step
-                    node[Y] += (node[SPEED] * sine + node[ASIDE] * cosine) * step
+                    node[X] += node[SPEED] * math.cos(middle) * step
+                    node[Y] += node[SPEED] * math.sin(middle) * step
                     node[YAW] += node[RATE] * step
                     time = (level * steps + s + 1) * step
                     room, apart = clearances(field, cell, discs, movers, node[X], node[Y], node[YAW], time)
@@ -109,7 +105,7 @@ def search(
         if found == 0:
             break
         order, seen = np.argsort(scores[:found]), {-1}
-        best, length = np.empty((width, 8)), 0
+        best, length = np.empty((width, 7)), 0
         for index in order:
             key = cell_of(nodes[index])
             if key not in seen:
