@@ -12,6 +12,9 @@ SPEEDS = (1.0, 0.5, 0.0, -1.0)
 """Of the fastest forwards and backwards."""
 TURNS = (-1.0, -0.4, 0.0, 0.4, 1.0)
 """Of the fastest turn, or of the tightest curve."""
+COARSE, FREE, BESIDE = 2, 0.85, 3.0
+"""Cells of a scan that are one of what is left to go; shares of its smallest disc that a base keeps there; and [m] that
+are added where there is no way."""
 WINDOW = 0.35
 """[s] of acceleration by which what is told may differ from what is."""
 
@@ -26,6 +29,7 @@ class Weights(NamedTuple):
         turn: [m/rad]
         heading: [m/rad] its end looks past what is made for.
         late: [1/s] of what is left, while it is.
+        back: [m] of a speed against that of the motion that was chosen last.
     """
 
     contact: float = 6.0
@@ -34,10 +38,29 @@ class Weights(NamedTuple):
     turn: float = 0.02
     heading: float = 0.1
     late: float = 0.05
+    back: float = 0.0
 
 
-NEAR: dict[BaseKind, float] = {BaseKind.ACKERMANN: 1.5}
-"""What nearness costs where it is not the usual weight: a car needs longer to get out of a way."""
+class Foresight(NamedTuple):
+    """How far a search looks ahead: `depth` motions of `steps` ticks, twice as many from the one numbered `fine` on."""
+
+    steps: int = 5
+    fine: int = 6
+    depth: int = 6
+
+
+USUAL: dict[BaseKind, tuple[Weights, Foresight]] = {
+    BaseKind.ACKERMANN: (Weights(near=3.0, back=0.05), Foresight(fine=4, depth=8))
+}
+"""Of kinds that differ: a car needs longer to get out of a way, and nowhere when it shunts to and fro."""
+
+
+class Chosen(NamedTuple):
+    """Velocities (3,), their cost [m], inf where all run into something, and the speed [m/s] of the whole motion."""
+
+    twist: Array
+    cost: float
+    speed: float
 
 
 class BeamSearch:
@@ -52,18 +75,16 @@ class BeamSearch:
         self,
         limits: BaseLimits,
         weights: Weights | None = None,
+        foresight: Foresight | None = None,
         *,
-        steps: int = 5,
-        depth: int = 6,
         width: int = 120,
         margins: tuple[float, float] = (0.4, 0.08),
     ) -> None:
-        """`depth` motions of `steps` ticks are looked ahead, `width` states are gone on with after each."""
+        """`width` states are gone on with after each motion."""
         self.limits = limits
-        if weights is None:
-            weights = Weights(near=NEAR.get(limits.kind, Weights().near))
-        self._weights, self._margins = np.array(weights, dtype=float), np.array(margins)
-        self._size = steps, depth, width
+        usual = USUAL.get(limits.kind, (Weights(), Foresight()))
+        self._weights, self._margins = np.array(weights or usual[0], dtype=float), np.array(margins)
+        self._size = *(foresight or usual[1]), width
         self._curved = limits.turning_radius > 0.0
         most = 1.0 / limits.turning_radius if self._curved else float(limits.high[2])
         speeds = [share * float(limits.high[0] if share >= 0 else -limits.low[0]) for share in SPEEDS]
@@ -72,22 +93,36 @@ class BeamSearch:
         )
 
     def choose(
-        self, field: Array, cell: float, aim: Array, now: Array, movers: Array, gear: float = 0.0
-    ) -> tuple[Array, float]:
-        """Velocities (3,), and their cost [m], inf where all run into something.
+        self,
+        field: Array,
+        cell: float,
+        path: Array,
+        aim: Array,
+        now: Array,
+        movers: Array,
+        gear: float = 0.0,
+        last: float = 0.0,
+    ) -> Chosen:
+        """What is best now.
 
-        The arguments are those of `DynamicWindow.choose`; `gear` is -1 where the way is to be gone backwards.
+        The arguments are those of `DynamicWindow.choose`; `gear` is -1 where the way is to be gone backwards, `last`
+        [m/s] the speed of what was chosen last.
         """
         from anysim_navigation.kernels import beam
 
-        limits, (steps, depth, width) = self.limits, self._size
+        limits, togo = self.limits, np.zeros((0, 0))
+        if self._curved:  # it goes further round than straight to a point ahead
+            togo = left_to_go(field, cell, path, FREE * float(limits.discs[:, 2].min()))
         first, cost = beam.search(
             field,
             float(cell),
             limits.discs,
             np.ascontiguousarray(movers),
             np.array(aim, dtype=float),
+            togo,
+            COARSE * cell,
             np.array(now, dtype=float),
+            float(last),
             self._motions,
             self._curved,
             limits.acceleration,
@@ -95,9 +130,7 @@ class BeamSearch:
             self._weights,
             self._margins,
             STEP,
-            steps,
-            depth,
-            width,
+            *self._size,
         )
         speed, turn = self._motions[first] if first >= 0 else (0.0, 0.0)
         most = limits.acceleration * WINDOW
@@ -105,4 +138,28 @@ class BeamSearch:
         told[1] = 0.0
         if self._curved:
             told[2] = turn * told[0]
-        return told, cost
+        return Chosen(told, cost, float(speed))
+
+
+def left_to_go(field: Array, cell: float, path: Array, room: float) -> Array:
+    """[m] from each cell of a coarser field to the end of a way (K, 2), or to where the way leaves the field.
+
+    Around what the field (rows, columns) has nearer than `room` [m]. From where there is no way it is a straight line.
+    """
+    from anysim_navigation.kernels import hybrid
+
+    size, half = COARSE * cell, 0.5 * cell * np.array(field.shape[::-1])
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    along = np.arange(0.0, arc[-1] + cell, cell)
+    points = np.stack([np.interp(along, arc, path[:, k]) for k in (0, 1)], axis=1)
+    beyond = np.flatnonzero((np.abs(points) > half - size).any(axis=1))
+    end = points[max(beyond[0] - 1, 0) if len(beyond) else -1]
+    free = field.reshape(field.shape[0] // COARSE, COARSE, -1, COARSE).mean(axis=(1, 3)) > room
+    j, i = ((end + half) / size).astype(int)
+    middle = np.array(free.shape) // 2
+    for row, column, wide in ((i, j, 1), (*middle, 2)):  # where it is and where it goes it can be
+        free[max(row - wide, 0) : row + wide + 1, max(column - wide, 0) : column + wide + 1] = True
+    togo = hybrid.distances_to(free, int(i), int(j)) * size
+    rows, columns = np.indices(togo.shape)
+    straight = np.hypot((columns + 0.5) * size - half[0] - end[0], (rows + 0.5) * size - half[1] - end[1])
+    return np.where(np.isfinite(togo), togo, straight + BESIDE)

@@ -61,8 +61,8 @@ class Movers:
         bodies: all of theirs.
     """
 
-    def __init__(self, scene: SceneView, names: Sequence[str], top: float = inf) -> None:
-        """What of them is higher than `top` [m] above the ground takes no room."""
+    def __init__(self, scene: SceneView, names: Sequence[str], top: float = inf, *, strides: bool = True) -> None:
+        """What of them is higher than `top` [m] above the ground takes no room; without `strides` each is one disc."""
         world = scene.engine.world
         self._scene = scene
         entities = [world.entities[world.entity_numbers[name]] for name in names]
@@ -76,12 +76,13 @@ class Movers:
             outline = outline_of(world, entity.name, world.initial_body_pose[self._roots[k]], top)
             low[k], high[k] = outline.min(axis=0), outline.max(axis=0)
         people = np.array([entity.family == PEOPLE for entity in entities], dtype=bool)
-        self._offset, radius = 0.5 * (low + high), 0.5 * (high - low).max(axis=1) + ASIDE * people
+        self._offset, radius = (0.5 * (low + high), 0.5 * (high - low).max(axis=1) + ASIDE * people)
         each = np.arange(len(entities))
-        self._discs = np.concatenate([each, each[people]])
+        pairs = each[people & strides]
+        self._discs = np.concatenate([each, pairs])
         """(M,) the mover of each disc: people have one before them and one behind."""
         self._radius = radius[self._discs]
-        self._stride = STRIDE * np.concatenate([people, -np.ones(people.sum())])
+        self._stride = STRIDE * np.concatenate([people & strides, -np.ones(len(pairs))])
 
     def there(self, row: int, standing: bool) -> Array:
         """(E,) bool: the entities that a map is to have, in a row of the scene: of movers none, or those that stand."""

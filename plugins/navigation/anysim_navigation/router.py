@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from copy import copy
 from enum import IntEnum
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -44,8 +45,6 @@ NEARER = 0.1
 """[m] of the way that count as nearer."""
 SEARCHING = (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN)
 """Who cannot go aside, and among movers searches for several velocities in a row."""
-APART = 0.12
-"""[m] more that others keep from movers: with one velocity at a time they learn late that these turn."""
 WITHIN = 4.5
 """[m] from it, movers are looked at by a search."""
 FREE, AWHILE = 0.9, 2.0
@@ -105,8 +104,9 @@ class BaseRouter:
         height = frame_pose(scene, frame)[2]
         self._grid = Grid((6.0, 6.0), 0.04, agent.step - height, agent.height - height)
         self._eye = Eye(scene, frame, "collision", "entity")
-        self._movers = Movers(scene, movers, agent.height)
         self.search = BeamSearch(limits) if movers and limits.kind in SEARCHING else None
+        searches = self.search is not None  # others learn late that people turn, and keep from all of them
+        self._movers = Movers(scene, movers, agent.height if searches else inf, strides=searches)
         self._seen = self._eye.seen & self._eye.geometry.without(self._movers.bodies)
         self._every = max(1, round(STEP / world.physics.control_dt))
         self.target, self.twist = np.zeros((2, n, 3))
@@ -117,6 +117,8 @@ class BaseRouter:
         self._progress: list[Progress | None] = [None] * n
         self._gear = np.zeros(n)
         """Of a car on its way: 1 forwards, -1 backwards."""
+        self._meant = np.zeros(n)
+        """Speed [m/s] of the motion that the search chose last."""
         self._later: list[list[tuple[Array, float]]] = [[] for _ in range(n)]
         """Of a car's way, the stretches beyond its next change of direction, and their gears."""
         self.refused: dict[int, str] = {}
@@ -276,13 +278,14 @@ class BaseRouter:
         gear = float(self._gear[env])
         if searching:
             assert self.search is not None
-            self.twist[env], _ = self.search.choose(field, cell, aim, now, close, gear)
+            found = self.search.choose(field, cell, path, aim, now, close, gear, self._meant[env])
+            self.twist[env], self._meant[env] = found.twist, found.speed
             return
+        self._meant[env] = 0.0
         if progress.recovering > 0:
             aim, gear = _roomiest(field, cell, movers), 0.0
             path = aim[None]
-        wider = movers + np.array([0.0, 0.0, 0.0, 0.0, APART])
-        choice = self.window.choose(field, cell, path, aim, now, self.twist[env], wider, gear)
+        choice = self.window.choose(field, cell, path, aim, now, self.twist[env], movers, gear)
         self.twist[env] = choice.twist
         if self.limits.kind in (BaseKind.DIFFERENTIAL,) and np.isfinite(choice.cost) and not choice.twist.any():
             bearing = float(np.arctan2(aim[1], aim[0]))
@@ -297,7 +300,7 @@ class BaseRouter:
         return all(clearances(field, self._grid.cell, discs, nobody, x, y, 0.0, 0.0)[0] > -0.02 for x, y in points)
 
 
-_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear")
+_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear", "_meant")
 
 
 def pose_of(pose: Array) -> Array:

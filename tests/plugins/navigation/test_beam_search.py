@@ -6,17 +6,22 @@ import numpy as np
 import pytest
 
 from anysim.conventions import Array
-from anysim_navigation.beam_search import BeamSearch
+from anysim_navigation.beam_search import BeamSearch, left_to_go
 from anysim_navigation.dynamic_window import STEP, DynamicWindow
 from anysim_navigation.limits import BaseKind, BaseLimits
+from anysim_navigation.kernels.window import distance_at
 from anysim_navigation.pose_control import in_frame
-from tests.plugins.navigation.test_local_planning import CELL, Scene, limits
+from tests.plugins.navigation.test_local_planning import CELL, SIDE, Scene, limits
 
 PASSAGE = Scene(((-3.0, -1.0, 6.0, -0.65), (-3.0, 0.65, -1.4, 2.4), (0.0, 0.65, 6.0, 2.4), (-1.4, 1.9, 0.0, 2.4)))
 """A passage of 1.3 m, in which nobody passes a base of 0.5 m, and a bay beside it."""
 GOAL = np.array([4.0, 0.0])
-PERSON = 0.25
+PERSON, AHEAD = 0.25, np.array([1.0, 0.0])
 Chooser = Callable[[Array, Array, Array, Array, Array], Array]
+
+
+def way_to(place: Array) -> Array:
+    return np.array([[0.0, 0.0], place])
 
 
 def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
@@ -44,7 +49,12 @@ def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
 def test_a_base_leaves_a_passage_for_who_comes_along_it_and_goes_on(kind: BaseKind) -> None:
     made = limits(kind)._replace(low=np.array([-0.6, 0.0, -1.5]))
     search = BeamSearch(made)
-    nearest, left = met(lambda field, aim, now, movers, _: search.choose(field, CELL, aim, now, movers)[0], made)
+
+    def choose(field: Array, aim: Array, now: Array, movers: Array, pose: Array) -> Array:
+        way = in_frame(pose, np.array([pose[:2], GOAL]))
+        return search.choose(field, CELL, way, aim, now, movers).twist
+
+    nearest, left = met(choose, made)
     assert nearest > 0.0
     assert left < 0.2
 
@@ -68,7 +78,8 @@ def test_a_car_never_turns_tighter_than_it_can() -> None:
     for _ in range(30):
         movers = np.array([[*rng.uniform(-2, 2, 2), *rng.uniform(-0.5, 0.5, 2), 0.25]])
         now = np.array([rng.uniform(-0.3, 0.6), 0.0, 0.0])
-        told, _ = search.choose(Scene().field(np.zeros(3)), CELL, rng.uniform(-1, 1, 2), now, movers)
+        aim = rng.uniform(-1, 1, 2)
+        told = search.choose(Scene().field(np.zeros(3)), CELL, way_to(aim), aim, now, movers).twist
         assert abs(told[2]) <= abs(told[0]) / 0.5 + 1e-9
 
 
@@ -76,7 +87,7 @@ def test_who_is_walled_in_stands() -> None:
     walls = Scene(((-1.0, -1.0, 1.0, -0.26), (-1.0, 0.26, 1.0, 1.0), (0.26, -1.0, 1.0, 1.0), (-1.0, -1.0, -0.26, 1.0)))
     search = BeamSearch(limits(BaseKind.ACKERMANN))
     moving = np.array([0.6, 0.0, 0.0])
-    told, cost = search.choose(walls.field(np.zeros(3)), CELL, np.array([1.0, 0.0]), moving, np.zeros((0, 5)))
+    told, cost, _ = search.choose(walls.field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD, moving, np.zeros((0, 5)))
     assert told[0] < moving[0]
     assert cost == np.inf
 
@@ -84,7 +95,33 @@ def test_who_is_walled_in_stands() -> None:
 def test_equal_questions_have_equal_answers() -> None:
     search = BeamSearch(limits(BaseKind.DIFFERENTIAL))
     movers = np.array([[1.0, 0.1, -0.4, 0.0, 0.25], [0.0, 1.0, 0.1, -0.3, 0.25]])
-    asked = Scene().field(np.zeros(3)), CELL, np.array([1.0, 0.0]), np.array([0.3, 0.0, 0.1]), movers
+    asked = Scene().field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD, np.array([0.3, 0.0, 0.1]), movers
     first, again = search.choose(*asked), search.choose(*asked)
-    assert (first[0] == again[0]).all()
-    assert first[1] == again[1]
+    assert (first.twist == again.twist).all()
+    assert first[1:] == again[1:]
+
+
+def test_a_car_that_shunts_goes_on_as_it_meant_to() -> None:
+    """Who stands may begin forwards or backwards to come to a place beside it: what was chosen last decides."""
+    search, nobody = BeamSearch(limits(BaseKind.ACKERMANN)), np.array([[9.0, 9.0, 0.0, 0.0, 0.25]])
+    aside = np.array([0.0, 0.6])
+    asked = Scene().field(np.zeros(3)), CELL, way_to(aside), aside, np.zeros(3), nobody
+    speeds = [search.choose(*asked, last=last).speed for last in (0.6, -0.6)]
+    assert speeds[0] >= 0.0 >= speeds[1]
+    assert speeds[0] != speeds[1]
+
+
+def test_what_is_left_to_go_leads_around_walls_to_where_the_way_leaves_the_scan() -> None:
+    """A wall across the straight line, 2 m wide: around its end, and with 2 m and more of a detour to the other side."""
+    wall = Scene(((0.5, -1.0, 0.6, 1.0),))
+    to = np.array([[0.0, 0.0], [0.55, 1.5], [1.1, 0.0]])
+    togo = left_to_go(wall.field(np.zeros(3)), CELL, to, 0.25)
+    size = 2 * CELL
+    at = {x: float(distance_at(togo, size, x, 0.0)) for x in (0.0, 1.1)}
+    corner = np.hypot(0.5 - 0.0, 1.25), np.hypot(1.1 - 0.6, 1.25)  # the disc goes around the wall's ends
+    assert at[0.0] == pytest.approx(sum(corner) + 0.1, rel=0.12)
+    assert at[1.1] < 0.1
+    beyond = left_to_go(Scene().field(np.zeros(3)), CELL, np.array([[0.0, 0.0], [20.0, 0.0]]), 0.25)
+    assert distance_at(beyond, size, 0.0, 0.0) == pytest.approx(SIDE * CELL / 2, abs=0.2)
+    shut = Scene(((0.3, -9.0, 0.4, 9.0),))
+    assert distance_at(left_to_go(shut.field(np.zeros(3)), CELL, to, 0.25), size, 0.0, 0.0) > 3.0

@@ -118,6 +118,9 @@ def test_people_take_the_room_that_their_feet_take_beside_a_low_base() -> None:
         assert np.allclose(before[:2] - behind[:2], 2 * STRIDE * before[2:4])
         tall, _ = Movers(env.scene, ["ann"], 1.3).around(np.array([0]), np.zeros((1, 3)))[0]
         assert 0.15 < before[4] < 0.3 < tall[4] < 0.45
+        (around,) = Movers(env.scene, ["ann"], strides=False).around(np.array([0]), np.zeros((1, 3)))[0]
+        assert np.allclose(around[:2], 0.5 * (before[:2] + behind[:2]), atol=0.03)
+        assert around[4] == tall[4]
 
 
 @pytest.mark.slow

@@ -6,14 +6,16 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math.compiled import compiled
-from anysim_navigation.kernels.window import SETTLED, clearances, looks_past, toward
+from anysim_navigation.kernels.window import SETTLED, clearances, distance_at, looks_past, toward
 
-CONTACT, NEAR, TIGHT, TURN, HEADING, LATE = range(6)
+CONTACT, NEAR, TIGHT, TURN, HEADING, LATE, BACK = range(7)
 """Places of the weights."""
 X, Y, YAW, SPEED, RATE, SPENT, FIRST = range(7)
 """Columns of a node: where it is, how fast, what its motions have cost, and the first of them."""
 PLACE, ANGLE = 0.12, 0.4
 """[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all."""
+ENOUGH = 0.05
+"""[m] from what is made for it is reached: motions that end nearer to it, and begin later for that, are no better."""
 KEPT = 0.02
 """[m] that motions keep from things, by which what is told and what is done may differ."""
 
@@ -29,12 +31,23 @@ def cell_of(node: Array) -> int:
 
 
 @compiled
-def remaining(node: Array, aim: Array, gear: float, heading: float) -> float:
-    """[m] from a node to what is made for, and what it looks past it; `gear` is -1 for who comes backwards."""
-    left = math.hypot(aim[0] - node[X], aim[1] - node[Y])
+def remaining(node: Array, aim: Array, togo: Array, size: float, gear: float, heading: float) -> float:
+    """[m] from a node to what is made for, and what it looks past it; `gear` is -1 for who comes backwards.
+
+    It is `aim` in a straight line, or where there is a field `togo`, of cells of so many metres, what that says.
+    """
+    x, y = node[X], node[Y]
+    if len(togo) == 0:
+        left = max(0.0, math.hypot(aim[0] - x, aim[1] - y) - ENOUGH)
+        off = looks_past(aim, x, y, node[YAW])
+    else:
+        left = distance_at(togo, size, x, y)
+        uphill = distance_at(togo, size, x + size, y) - distance_at(togo, size, x - size, y)
+        aside = distance_at(togo, size, x, y + size) - distance_at(togo, size, x, y - size)
+        off = math.atan2(-aside, -uphill) - node[YAW]
+        off = abs(math.atan2(math.sin(off), math.cos(off)))
     if left <= SETTLED:
         return left
-    off = looks_past(aim, node[X], node[Y], node[YAW])
     return left + heading * (off if gear >= 0.0 else math.pi - off)
 
 
@@ -45,7 +58,10 @@ def search(
     discs: Array,
     movers: Array,
     aim: Array,
+    togo: Array,
+    size: float,
     now: Array,
+    last: float,
     motions: Array,
     curved: bool,
     acceleration: Array,
@@ -54,21 +70,24 @@ def search(
     margins: Array,
     step: float,
     steps: int,
+    fine: int,
     depth: int,
     width: int,
 ) -> tuple[int, float]:
     """The motion to begin with, -1 if all run into something; and its cost [m].
 
     All is in the frame of the base as it is now. `motions` (K, 2) are speeds [m/s] with turns [rad/s], or where
-    `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], and `depth` of them follow one another.
+    `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], twice that from the one numbered `fine`
+    on, and `depth` of them follow one another. `last` [m/s] is the speed of the motion that was chosen last, and
     `margins` are the distances [m] to movers and to things below which nearness costs.
     """
     count = len(motions)
     floor = min(KEPT, clearances(field, cell, discs, movers[:0], 0.0, 0.0, 0.0, 0.0)[0]) - 1e-6
     kept = np.zeros((1, 7))
     kept[0, SPEED], kept[0, RATE] = now[0], now[2]
-    first, cost = -1, np.inf
+    first, cost, begun = -1, np.inf, 0.0
     for level in range(depth):
+        h = step if level < fine else 2.0 * step
         nodes, scores, found = np.empty((len(kept) * count, 7)), np.empty(len(kept) * count), 0
         for i in range(len(kept)):
             for k in range(count):
@@ -76,30 +95,32 @@ def search(
                 node[:] = kept[i]
                 if level == 0:
                     node[FIRST] = k
+                    if last * motions[k, 0] < 0.0:
+                        node[SPENT] += weights[BACK]
                 free = True
                 for s in range(steps):
-                    node[SPEED] = toward(node[SPEED], motions[k, 0], acceleration[0] * step)
+                    node[SPEED] = toward(node[SPEED], motions[k, 0], acceleration[0] * h)
                     turn = motions[k, 1] * (node[SPEED] if curved else 1.0)
-                    node[RATE] = toward(node[RATE], turn, acceleration[2] * step)
-                    middle = node[YAW] + 0.5 * node[RATE] * step
-                    node[X] += node[SPEED] * math.cos(middle) * step
-                    node[Y] += node[SPEED] * math.sin(middle) * step
-                    node[YAW] += node[RATE] * step
-                    time = (level * steps + s + 1) * step
+                    node[RATE] = toward(node[RATE], turn, acceleration[2] * h)
+                    middle = node[YAW] + 0.5 * node[RATE] * h
+                    node[X] += node[SPEED] * math.cos(middle) * h
+                    node[Y] += node[SPEED] * math.sin(middle) * h
+                    node[YAW] += node[RATE] * h
+                    time = begun + (s + 1) * h
                     room, apart = clearances(field, cell, discs, movers, node[X], node[Y], node[YAW], time)
                     if room < floor:
                         free = False
                         break
                     if apart < 0.0:
-                        node[SPENT] += weights[CONTACT] * step * (1.0 - apart / 0.2)
+                        node[SPENT] += weights[CONTACT] * h * (1.0 - apart / 0.2)
                     elif apart < margins[0]:
-                        node[SPENT] += weights[NEAR] * step * (1.0 - apart / margins[0])
+                        node[SPENT] += weights[NEAR] * h * (1.0 - apart / margins[0])
                     if room < margins[1]:
-                        node[SPENT] += weights[TIGHT] * step * (1.0 - room / margins[1])
-                    node[SPENT] += weights[TURN] * step * abs(node[RATE])
+                        node[SPENT] += weights[TIGHT] * h * (1.0 - room / margins[1])
+                    node[SPENT] += weights[TURN] * h * abs(node[RATE])
                 if free:
-                    left = remaining(node, aim, gear, weights[HEADING])
-                    node[SPENT] += weights[LATE] * step * steps * left  # else it could as well go there later
+                    left = remaining(node, aim, togo, size, gear, weights[HEADING])
+                    node[SPENT] += weights[LATE] * h * steps * left  # else it could as well go there later
                     scores[found] = node[SPENT] + left
                     found += 1
         if found == 0:
@@ -115,5 +136,5 @@ def search(
                 if length == width:
                     break
         kept = best[:length].copy()
-        first, cost = int(kept[0, FIRST]), float(scores[order[0]])
+        first, cost, begun = int(kept[0, FIRST]), float(scores[order[0]]), begun + steps * h
     return first, cost
