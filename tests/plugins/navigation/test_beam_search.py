@@ -8,8 +8,8 @@ import pytest
 from anysim.conventions import Array
 from anysim_navigation.beam_search import BeamSearch, left_to_go
 from anysim_navigation.dynamic_window import STEP, DynamicWindow
-from anysim_navigation.limits import BaseKind, BaseLimits
 from anysim_navigation.kernels.window import distance_at
+from anysim_navigation.limits import BaseKind, BaseLimits
 from anysim_navigation.pose_control import in_frame
 from tests.plugins.navigation.test_local_planning import CELL, SIDE, Scene, limits
 
@@ -112,7 +112,7 @@ def test_a_car_that_shunts_goes_on_as_it_meant_to() -> None:
 
 
 def test_what_is_left_to_go_leads_around_walls_to_where_the_way_leaves_the_scan() -> None:
-    """A wall across the straight line, 2 m wide: around its end, and with 2 m and more of a detour to the other side."""
+    """A wall of 2 m across the straight line: around its end; where nothing leads around, straight and further."""
     wall = Scene(((0.5, -1.0, 0.6, 1.0),))
     to = np.array([[0.0, 0.0], [0.55, 1.5], [1.1, 0.0]])
     togo = left_to_go(wall.field(np.zeros(3)), CELL, to, 0.25)
