@@ -141,7 +141,7 @@ class BaseRouter:
         due = self._steps[ids] % self._every == 0
         self._steps[ids] += 1
         routed = self.mode[ids] == Mode.ROUTE
-        if self.search is not None:  # who has come near its end may have to give way yet
+        if self._movers.names:  # who has come near its end may have to give way yet
             ends = [self._progress[env] is not None for env in ids.tolist()]
             routed |= (self.mode[ids] == Mode.DIRECT) & ends
         route = np.flatnonzero(due & routed)
@@ -263,8 +263,7 @@ class BaseRouter:
         if car and float(np.hypot(*(end - pose[:2]))) < (STOPS_AMONG if searching else CAR_STOPS):
             self.mode[env], self.twist[env] = Mode.STAND, 0.0  # it cannot turn on the spot, so there is nothing to do
             return
-        alone = not searching or _is_free(movers)
-        if progress.left < NEAR and not car and alone and self._straight(field, pose, end):
+        if progress.left < NEAR and not car and _is_free(movers) and self._straight(field, pose, end):
             self.mode[env] = Mode.DIRECT
             way = in_frame(pose, end[None])[0]
             self.twist[env] = self._pose_control.twist(way, P.wrapped(self.target[env, 2] - pose[2]), self.twist[env])
