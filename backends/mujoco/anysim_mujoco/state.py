@@ -74,11 +74,11 @@ class StateReader:
         )
         self._take = _TwistColumns.of(layout)
         self._sensordata = batch.bind("sensordata")
-        self._touching = np.concatenate([np.zeros(0, dtype=np.intp), *(at.reshape(-1) for at in layout.sensors)])
+        self._contact_at = np.concatenate([np.zeros(0, dtype=np.intp), *(at.reshape(-1) for at in layout.sensors)])
         """(K,) places in `sensordata` of all that adds up to contact sensors."""
         axes = [3 * index + np.tile(np.arange(3), len(at)) for index, at in enumerate(layout.sensors)]
         into = np.concatenate([np.zeros(0, dtype=np.intp), *axes])
-        self._touched = (3 * len(layout.sensors) * np.arange(n)[:, None] + into).reshape(-1)
+        self._contact_into = (3 * len(layout.sensors) * np.arange(n)[:, None] + into).reshape(-1)
         """(n K,) where it goes in a flat array of their forces."""
         self._warnings = batch.warning[:, :, 1]
         self.joint_pos = _columns(self._qpos, layout.joint_q)
@@ -158,8 +158,8 @@ class StateReader:
 
     def contact_force(self) -> Array:
         force = np.zeros((len(self._qpos), len(self._layout.sensors), 3))
-        if len(self._touching):  # MuJoCo reports what the body does to the others; summed one after another
-            np.subtract.at(force.reshape(-1), self._touched, self._sensordata[:, self._touching].reshape(-1))
+        if len(self._contact_at):  # MuJoCo reports what the body does to the others; summed one after another
+            np.subtract.at(force.reshape(-1), self._contact_into, self._sensordata[:, self._contact_at].reshape(-1))
         if self._any_held:
             force[self._held] = self._held_contact[self._held]
         return force

@@ -106,14 +106,14 @@ class Avatars(Family):
         self.remember("queue", count, LENGTH, WIDTH)
         self._points = self.remember("points", count * len(BONES), 3)
         self._speeds = self.remember("speeds", count * len(BONES), 3)
-        scripts = [setting.spec.one(number).do for number in range(count)]
-        paths = [self._path(number, "do") for number in range(count)]
-        self._script = np.array([self._rows(*each) for each in zip(scripts, paths, strict=True)])
-        self._drawn = [(i, *each) for i, do in enumerate(scripts) for each in _drawn(do, self.body, self.clip_number)]
+        self._each = [setting.spec.one(number) for number in range(count)]
+        self._script = np.array([self._rows(one.do, self._path(i, "do")) for i, one in enumerate(self._each)])
+        found = self.body, self.clip_number
+        self._drawn = [(i, *value) for i, one in enumerate(self._each) for value in _drawn(one.do, *found)]
 
     def _path(self, number: int, key: str) -> str:
-        """Where a key is said that holds for one of them."""
-        own = getattr(self.spec_.own(number), key) is not None
+        """Where a key, `x` or `do.0.reach`, is said that holds for one of them."""
+        own = getattr(self.spec_.own(number), key.partition(".")[0]) is not None
         return f"world.families.{self.setting.name}.{f'each.{number}.' if own else ''}{key}"
 
     def _read(self, clip: str, file: str) -> Motion:
@@ -176,41 +176,39 @@ class Avatars(Family):
     # ------------------------------------------------------------------ its life
 
     def reset(self, env_ids: Array) -> None:
-        spec, memory = self.spec_, self.memory
-        for number in range(spec.number):
-            own = spec.one(number)
-            for column, (key, value) in enumerate((("x", own.x), ("y", own.y))):
-                beside = 0.0 if column == 0 or is_random(value) else _aside(spec, number)
-                drawn = self._values(number, key, value, env_ids)
-                memory["pos"][env_ids, number, column] = drawn + beside + self.setting.origin[env_ids, column]
-            memory["yaw"][env_ids, number] = self._values(number, "yaw", own.yaw, env_ids)
+        memory, origin = self.memory, self.setting.origin[env_ids]
+        for number, own in enumerate(self._each):
+            beside = 0.0 if is_random(own.y) else _aside(self.spec_, number)
+            x, y, yaw = (self._values(number, key, getattr(own, key), env_ids) for key in ("x", "y", "yaw"))
+            memory["pos"][env_ids, number] = np.stack([x + origin[:, 0], y + beside + origin[:, 1]], axis=1)
+            memory["yaw"][env_ids, number] = yaw
         memory["queue"][env_ids] = self._script
         for number, row, columns, key, value in self._drawn:
-            drawn = self._values(number, key, value, env_ids, "do")
+            drawn = self._values(number, f"do.{key}", value, env_ids)
             memory["queue"][env_ids, number, row, columns] = drawn.reshape(len(env_ids), -1)
         gait, legs, sizes = self._gait(env_ids), self._legs(env_ids), self._sizes(env_ids)
         stand(gait, legs, self._ground(gait.feet[:, :, :2] + gait.pos[:, None]))
         self._begin_as_told(env_ids, gait, legs, sizes)
 
-    def _values(self, number: int, key: str, value: object, env_ids: Array, under: str = "") -> Array:
+    def _values(self, number: int, key: str, value: object, env_ids: Array) -> Array:
         """(n, …) a value of one of them in the episodes of these envs."""
-        stream = "/".join(part for part in ("family", self.setting.name, str(number), under, key) if part)
-        path = f"{self._path(number, under)}.{key}" if under else self._path(number, key)
-        return draw_rows(value, stream, self.setting.streams, env_ids, source=path)
+        stream = f"family/{self.setting.name}/{number}/{key.replace('.', '/', 1)}"
+        return draw_rows(value, stream, self.setting.streams, env_ids, source=self._path(number, key))
 
     def _begin_as_told(self, env_ids: Array, gait: Gait, legs: Legs, sizes: Sizes) -> None:
         """They hold the clip, gaze, reach and bend of their first action when an episode begins."""
         rows = len(gait.pos)
         first = self._take(env_ids, "queue")[:, 0]
-        plays = np.where(first[:, Column.KIND] == Kind.CLIP, first[:, Column.CLIP], -1).astype(np.int64)
+        held = (first[:, Column.KIND] == Kind.CLIP) & (first[:, Column.CLIP] < len(clips.CLIPS))
+        plays = np.where(held, first[:, Column.CLIP], 0).astype(np.int64)
         posture = _first("", first[:, Column.SEAT], legs)
-        for number in np.unique(plays[(plays >= 0) & (plays < len(clips.CLIPS))]):
-            mine = plays == number
+        for number in np.unique(plays[held]):
+            mine = held & (plays == number)
             seats, theirs = first[mine, Column.SEAT], Legs(*(values[mine] for values in legs))
             posture[mine] = _first(self._clips[number], seats, theirs)
         gait.hips[:] -= posture[:, clips.DROP]
         now = {"posture": posture, "before": posture, "fade": np.full(rows, FADE), "bend": first[:, Column.BEND]}
-        now["playing"] = np.where((plays >= 0) & (plays < len(clips.CLIPS)), plays, 0)
+        now["playing"] = plays
         scene = self._scene(env_ids)
         now["gazing"], now["gaze"] = first[:, Column.GAZING], _points(scene, first, Column.GAZE_BODY, Column.GAZE)
         hand = first[:, Column.HAND].astype(int)

@@ -7,6 +7,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim_navigation.dynamic_window import STEP
 from anysim_navigation.limits import BaseKind, BaseLimits
+from anysim_navigation.progress import arcs_of, points_at
 
 SPEEDS = (1.0, 0.5, 0.0, -1.0)
 """Of the fastest forwards and backwards."""
@@ -149,9 +150,8 @@ def left_to_go(field: Array, cell: float, path: Array, room: float) -> Array:
     from anysim_navigation.kernels import hybrid
 
     size, half = COARSE * cell, 0.5 * cell * np.array(field.shape[::-1])
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    along = np.arange(0.0, arc[-1] + cell, cell)
-    points = np.stack([np.interp(along, arc, path[:, k]) for k in (0, 1)], axis=1)
+    arcs = arcs_of(path)
+    points = points_at(path, arcs, np.arange(0.0, arcs[-1] + cell, cell))
     beyond = np.flatnonzero((np.abs(points) > half - size).any(axis=1))
     end = points[max(beyond[0] - 1, 0) if len(beyond) else -1]
     free = field.reshape(field.shape[0] // COARSE, COARSE, -1, COARSE).mean(axis=(1, 3)) > room

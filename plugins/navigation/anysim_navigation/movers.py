@@ -76,7 +76,7 @@ class Movers:
             outline = outline_of(world, entity.name, world.initial_body_pose[self._roots[k]], top)
             low[k], high[k] = outline.min(axis=0), outline.max(axis=0)
         people = np.array([entity.family == PEOPLE for entity in entities], dtype=bool)
-        self._offset, radius = (0.5 * (low + high), 0.5 * (high - low).max(axis=1) + ASIDE * people)
+        self._offset, radius = 0.5 * (low + high), 0.5 * (high - low).max(axis=1) + ASIDE * people
         each = np.arange(len(entities))
         pairs = each[people & strides]
         self._discs = np.concatenate([each, pairs])

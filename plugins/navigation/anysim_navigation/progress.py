@@ -15,12 +15,22 @@ RECOVERY = 1.5
 """[s] that a recovery lasts; then the clock begins anew whatever it came to."""
 
 
+def arcs_of(path: Array) -> Array:
+    """(K,) [m] from the beginning of a way (K, 2) to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+
+
+def points_at(path: Array, arcs: Array, at: Array | float) -> Array:
+    """(..., 2) the points of a way (K, 2) so far along it, `arcs` (K,) those of its own."""
+    return np.stack([np.interp(at, arcs, path[:, k]) for k in (0, 1)], axis=-1)
+
+
 class Progress:
     """A way (K, 2) and how far along it a base has come. Times are counted in ticks that the caller gives."""
 
     def __init__(self, path: Array) -> None:
         self.path = path
-        self._arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        self._arc = arcs_of(path)
         self.length = length_of(path)
         self.arc = self._best = 0.0
         self.off = 0.0
@@ -70,4 +80,4 @@ class Progress:
         return np.concatenate([here[None], later]), there
 
     def _at(self, arc: float) -> Array:
-        return np.array([np.interp(arc, self._arc, self.path[:, k]) for k in (0, 1)])
+        return points_at(self.path, self._arc, arc)

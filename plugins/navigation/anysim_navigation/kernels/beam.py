@@ -6,7 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math.compiled import compiled
-from anysim_navigation.kernels.window import SETTLED, clearances, distance_at, looks_past, toward
+from anysim_navigation.kernels.window import SETTLED, between, clearances, distance_at, looks_past, toward
 
 CONTACT, NEAR, TIGHT, TURN, HEADING, LATE, BACK = range(7)
 """Places of the weights."""
@@ -42,10 +42,9 @@ def remaining(node: Array, aim: Array, togo: Array, size: float, gear: float, he
         off = looks_past(aim, x, y, node[YAW])
     else:
         left = distance_at(togo, size, x, y)
-        uphill = distance_at(togo, size, x + size, y) - distance_at(togo, size, x - size, y)
+        further = distance_at(togo, size, x + size, y) - distance_at(togo, size, x - size, y)
         aside = distance_at(togo, size, x, y + size) - distance_at(togo, size, x, y - size)
-        off = math.atan2(-aside, -uphill) - node[YAW]
-        off = abs(math.atan2(math.sin(off), math.cos(off)))
+        off = between(math.atan2(-aside, -further) - node[YAW])
     if left <= SETTLED:
         return left
     return left + heading * (off if gear >= 0.0 else math.pi - off)

@@ -74,10 +74,15 @@ def distance_to_path(path: Array, x: float, y: float) -> float:
 
 
 @compiled
+def between(angle: float) -> float:
+    """[rad] of a difference of headings, from 0 to half a turn."""
+    return abs(math.atan2(math.sin(angle), math.cos(angle)))
+
+
+@compiled
 def looks_past(aim: Array, x: float, y: float, yaw: float) -> float:
     """[rad] between where a pose looks and a point, from 0 to half a turn."""
-    off = math.atan2(aim[1] - y, aim[0] - x) - yaw
-    return abs(math.atan2(math.sin(off), math.cos(off)))
+    return between(math.atan2(aim[1] - y, aim[0] - x) - yaw)
 
 
 @compiled
