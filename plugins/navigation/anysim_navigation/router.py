@@ -127,6 +127,8 @@ class BaseRouter:
         """Go to x, y, yaw (n, 3) in these envs."""
         self.target[ids], self.mode[ids], self._steps[ids], self._replans[ids] = target, mode, 0, 0
         self._least[ids] = np.inf
+        if mode is Mode.STAND:  # an episode begins so: it does not go on from what the last one ended with
+            self.twist[ids], self._meant[ids] = 0.0, 0.0
         for env in ids.tolist():
             self._progress[env] = None
             self.refused.pop(env, None)

@@ -36,11 +36,20 @@ WORLD: dict[str, Any] = {
 }
 
 
-def crossing(engine: str, expert: dict[str, Any], do: list[Any] | None = None) -> TaskEnv:
+DRIVES: dict[str, Any] = {
+    "holonomic_base": WORLD["robots"]["base"],
+    "ackermann_base": {
+        "robot": "ackermann_base",
+        "actions": {"base": {"controller": "ackermann_drive", "params": {"steer_by": "rate"}}},
+    },
+}
+
+
+def crossing(engine: str, expert: dict[str, Any], do: list[Any] | None = None, base: str = "holonomic_base") -> TaskEnv:
     """A base on its way to where ann crosses its path."""
     require_engine(engine)
     ann = WORLD["families"]["ann"] | ({} if do is None else {"do": do})
-    world = WORLD | {"robots": {"base": WORLD["robots"]["base"]}, "families": {"ann": ann}}
+    world = WORLD | {"robots": {"base": DRIVES[base]}, "families": {"ann": ann}}
     world |= {"contact_sensors": {"met": {"body": "ann", "against": "base"}}}
     task = {
         "horizon": 1000,
@@ -162,6 +171,23 @@ def test_a_drive_among_people_goes_on_from_a_snapshot_bit_for_bit() -> None:
         assert np.array_equal(first, again)
         env.reset_to(env_then)  # and without what the router knew it goes another way
         assert not np.array_equal(first, gone(env, policy, 40)[0])
+
+
+@pytest.mark.parametrize("base", ["holonomic_base", "ackermann_base"])
+def test_an_episode_does_not_depend_on_where_the_last_one_was_cut_off(base: str) -> None:
+    with crossing("mujoco", {"planner": "dynamic_window"}, base=base) as env:
+        policy, one = begun(env), np.array([0])
+        first, _ = gone(env, policy, 75)
+        driver = policy.skill.movers[0]
+        assert isinstance(driver, PlannedBase)
+        assert driver.router is not None
+        assert driver.router.twist.any()
+        env.reset(seed=2)
+        policy.begin(one)
+        rows = driver.router.snapshot(one)[0].rows
+        assert not (rows["twist"].any() or rows["_meant"].any())
+        again, _ = gone(env, policy, 75)
+        assert np.array_equal(first, again)
 
 
 @pytest.mark.parametrize("engine", [*others("pybullet"), pytest.param("mujoco", marks=pytest.mark.full)])
