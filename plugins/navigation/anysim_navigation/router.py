@@ -43,8 +43,8 @@ REPLANS = 12
 """Ways in a row that did not bring a base nearer to its end before it gives up; a quarter where nobody moves."""
 NEARER = 0.1
 """[m] of the way that count as nearer."""
-SEARCHING = (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN)
-"""Who cannot go aside, and among movers searches for several velocities in a row."""
+SEARCHING = (BaseKind.HOLONOMIC, BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN)
+"""Who goes on wheels, and among movers searches for several velocities in a row."""
 WITHIN = 4.5
 """[m] from it, movers are looked at by a search."""
 FREE, AWHILE = 0.9, 2.0

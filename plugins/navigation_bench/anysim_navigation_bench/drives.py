@@ -61,7 +61,7 @@ class Driving(NamedTuple):
 _ON_LEGS: dict[str, Any] = {"close": 0.25, "facing": 0.3, "still": (0.15, 0.6), "tilts": True}
 BASES: dict[str, Driving] = {
     "differential_base": Driving(controller="differential_drive", skill={"rate": 2.5}),
-    "holonomic_base": Driving(controller="holonomic_drive"),
+    "holonomic_base": Driving(controller="holonomic_drive", skill={"rate": 2.5}),
     "ackermann_base": Driving(
         0.7,
         {"controller": "ackermann_drive", "params": {"steer_by": "rate"}},
