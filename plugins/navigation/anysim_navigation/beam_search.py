@@ -65,7 +65,7 @@ class Chosen(NamedTuple):
 
 
 class BeamSearch:
-    """Velocities of a base on wheels among movers, none of them sideways. It remembers nothing.
+    """Velocities of a base among movers, none of them sideways. It remembers nothing.
 
     The dynamic window holds one velocity for the time that it looks ahead. Who has to turn first, or to shunt, needs
     several in a row to let somebody pass: here motions of half a second follow one another, and of all that they lead

@@ -43,8 +43,8 @@ REPLANS = 12
 """Ways in a row that did not bring a base nearer to its end before it gives up; a quarter where nobody moves."""
 NEARER = 0.1
 """[m] of the way that count as nearer."""
-SEARCHING = (BaseKind.HOLONOMIC, BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN)
-"""Who goes on wheels, and among movers searches for several velocities in a row."""
+SEARCHING = tuple(kind for kind in BaseKind if kind is not BaseKind.HUMANOID)
+"""Who searches for several velocities in a row among movers: a humanoid is too slow to get out of their way so."""
 WITHIN = 4.5
 """[m] from it, movers are looked at by a search."""
 FREE, AWHILE = 0.9, 2.0

@@ -205,9 +205,11 @@ def test_a_room_is_crossed_among_four_people(engine: str) -> None:
         pytest.param("differential_base", 8, marks=pytest.mark.slow),
         pytest.param("differential_base", 12, marks=pytest.mark.full),
         pytest.param("ackermann_base", 5, marks=pytest.mark.full),
+        pytest.param("holonomic_base", 12, marks=pytest.mark.full),
+        pytest.param("holonomic_base", 17, marks=pytest.mark.full),
     ],
 )
-def test_who_cannot_go_aside_gives_way_to_people_and_gets_through(base: str, room: int) -> None:
+def test_a_base_gives_way_to_people_and_gets_through(base: str, room: int) -> None:
     require_engine("mujoco")
     found = drive(room, base, "mujoco", people=4)
     assert found is not None
