@@ -43,8 +43,6 @@ REPLANS = 12
 """Ways in a row that did not bring a base nearer to its end before it gives up; a quarter where nobody moves."""
 NEARER = 0.1
 """[m] of the way that count as nearer."""
-SEARCHING = tuple(kind for kind in BaseKind if kind is not BaseKind.HUMANOID)
-"""Who searches for several velocities in a row among movers: a humanoid is too slow to get out of their way so."""
 WITHIN = 4.5
 """[m] from it, movers are looked at by a search."""
 FREE, AWHILE = 0.9, 2.0
@@ -104,8 +102,8 @@ class BaseRouter:
         height = frame_pose(scene, frame)[2]
         self._grid = Grid((6.0, 6.0), 0.04, agent.step - height, agent.height - height)
         self._eye = Eye(scene, frame, "collision", "entity")
-        self.search = BeamSearch(limits) if movers and limits.kind in SEARCHING else None
-        searches = self.search is not None  # others learn late that people turn, and keep from all of them
+        searches = limits.kind is not BaseKind.HUMANOID  # which is too slow for it, and keeps from all of a person
+        self.search = BeamSearch(limits) if movers and searches else None
         self._movers = Movers(scene, movers, agent.height if searches else inf, strides=searches)
         self._seen = self._eye.seen & self._eye.geometry.without(self._movers.bodies)
         self._every = max(1, round(STEP / world.physics.control_dt))
@@ -288,7 +286,7 @@ class BaseRouter:
             path = aim[None]
         choice = self.window.choose(field, cell, path, aim, now, self.twist[env], movers, gear)
         self.twist[env] = choice.twist
-        if self.limits.kind in (BaseKind.DIFFERENTIAL,) and np.isfinite(choice.cost) and not choice.twist.any():
+        if self.limits.kind is BaseKind.DIFFERENTIAL and np.isfinite(choice.cost) and not choice.twist.any():
             bearing = float(np.arctan2(aim[1], aim[0]))
             self.twist[env] = self._pose_control.turning(bearing)  # who stands may turn
 
