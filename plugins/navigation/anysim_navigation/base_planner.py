@@ -14,7 +14,7 @@ from anysim_navigation.limits import OUTPUTS, SWAY, BaseKind, BaseLimits, kind_o
 from anysim_navigation.movers import movers_of
 from anysim_navigation.progress import PATIENCE, RECOVERY
 from anysim_navigation.robot_shape import discs_of
-from anysim_navigation.router import BaseRouter, Mode, frame_pose
+from anysim_navigation.router import REPLANS, BaseRouter, Mode, frame_pose
 from anysim_navigation.way_costs import way_lengths
 from anysim_schemas.vehicle import AckermannSpec
 from anysim_skills.moving.base import Base
@@ -38,8 +38,11 @@ class PlannedBase(Base):
         self._labels = tuple(self._slice.controller.labels)
         self.router: BaseRouter | None = None
         self._named: tuple[str, ...] | None = None
-        # it recovers by itself first
-        self.held_up += round((PATIENCE + RECOVERY) / env.engine.world.physics.control_dt)
+        self._wait(1)  # it recovers by itself first
+
+    def _wait(self, ways: int) -> None:
+        """Have skills let it try so many ways more before they say that something holds it."""
+        self.held_up += round(ways * (PATIENCE + RECOVERY) / self.env.engine.world.physics.control_dt)
 
     def foresee(self, movers: Sequence[str]) -> None:
         if self.router is not None:
@@ -58,6 +61,8 @@ class PlannedBase(Base):
         if self.router is None:
             movers = movers_of(self.env.engine.world, self._robot.name, self._named)
             scene, limits = self.env.scene, self._limits()
+            if movers:  # who stands may let somebody pass; the router says when it gives up
+                self._wait(REPLANS)
             self.router = BaseRouter(scene, self._robot, self.frame, limits, movers=movers, close=self.close)
         return self.router
 

@@ -13,6 +13,8 @@ SPEEDS = (1.0, 0.5, 0.0, -1.0)
 """Of the fastest forwards and backwards."""
 TURNS = (-1.0, -0.4, 0.0, 0.4, 1.0)
 """Of the fastest turn, or of the tightest curve."""
+WAYS, PACES = 12, (1.0, 0.5)
+"""Directions of who goes sideways and does not turn, the first to what is made for, and shares of its speed."""
 COARSE, FREE, BESIDE = 2, 0.85, 3.0
 """Cells of a scan that are one of what is left to go; shares of its smallest disc that a base keeps there; and [m] that
 are added where there is no way."""
@@ -25,6 +27,7 @@ class Weights(NamedTuple):
 
     Attributes:
         contact: [m/s] of overlapping a mover; twice as much from 0.2 m on.
+        into: [m/m] of going further into one than if it stood.
         near: [m/s] of being close to one, less with the distance.
         tight: [m/s] of being close to things.
         turn: [m/rad]
@@ -34,6 +37,7 @@ class Weights(NamedTuple):
     """
 
     contact: float = 6.0
+    into: float = 0.0
     near: float = 0.72
     tight: float = 0.3
     turn: float = 0.02
@@ -43,17 +47,23 @@ class Weights(NamedTuple):
 
 
 class Foresight(NamedTuple):
-    """How far a search looks ahead: `depth` motions of `steps` ticks, twice as many from the one numbered `fine` on."""
+    """How far a search looks ahead: `depth` motions of `steps` ticks, twice as many from the one numbered `fine` on.
+
+    It makes for a point of the way that is `aim` [s] ahead at full speed.
+    """
 
     steps: int = 5
     fine: int = 6
     depth: int = 6
+    aim: float = 1.6
 
 
 USUAL: dict[BaseKind, tuple[Weights, Foresight]] = {
-    BaseKind.ACKERMANN: (Weights(near=3.0, back=0.05), Foresight(fine=4, depth=8))
+    BaseKind.ACKERMANN: (Weights(near=3.0, back=0.05), Foresight(fine=4, depth=8)),
+    BaseKind.HOLONOMIC: (Weights(into=30.0, tight=0.1, heading=0.0, late=0.15), Foresight(aim=2.4)),
 }
-"""Of kinds that differ: a car needs longer to get out of a way, and nowhere when it shunts to and fro."""
+"""Of kinds that differ: a car needs longer to get out of a way, and nowhere when it shunts to and fro; who can go aside
+gets out of one at once, and need not wait before what is narrow."""
 
 
 class Chosen(NamedTuple):
@@ -65,11 +75,14 @@ class Chosen(NamedTuple):
 
 
 class BeamSearch:
-    """Velocities of a base among movers, none of them sideways. It remembers nothing.
+    """Velocities of a base among movers, sideways where it is holonomic. It remembers nothing.
 
     The dynamic window holds one velocity for the time that it looks ahead. Who has to turn first, or to shunt, needs
     several in a row to let somebody pass: here motions of half a second follow one another, and of all that they lead
     to the most promising are gone on with (a beam search, after Lowerre 1976). Movers go on as they do now.
+
+    Attributes:
+        reach: [m] how far ahead the point of the way is that it makes for.
     """
 
     def __init__(
@@ -85,13 +98,20 @@ class BeamSearch:
         self.limits = limits
         usual = USUAL.get(limits.kind, (Weights(), Foresight()))
         self._weights, self._margins = np.array(weights or usual[0], dtype=float), np.array(margins)
-        self._size = *(foresight or usual[1]), width
+        *size, aim = foresight or usual[1]
+        self._size = *size, width
+        self.reach = float(limits.high[0]) * aim
         self._curved = limits.turning_radius > 0.0
         most = 1.0 / limits.turning_radius if self._curved else float(limits.high[2])
         speeds = [share * float(limits.high[0] if share >= 0 else -limits.low[0]) for share in SPEEDS]
         self._motions = np.array(
-            [(v, most * turn) for v in speeds for turn in (TURNS if v or not self._curved else (0.0,))]
+            [(v, 0.0, most * turn) for v in speeds for turn in (TURNS if v or not self._curved else (0.0,))]
         )
+        self._aside = limits.kind is BaseKind.HOLONOMIC
+        if self._aside:
+            ways = 2 * np.pi * np.arange(WAYS) / WAYS
+            each = np.stack([np.cos(ways), np.sin(ways), np.zeros(WAYS)], axis=1) * float(limits.high[0])
+            self._motions = np.concatenate([np.zeros((1, 3)), *(share * each for share in PACES)])
 
     def choose(
         self,
@@ -111,7 +131,13 @@ class BeamSearch:
         """
         from anysim_navigation.kernels import beam
 
-        limits, togo = self.limits, np.zeros((0, 0))
+        limits, togo, motions = self.limits, np.zeros((0, 0)), self._motions
+        now = np.array(now, dtype=float)
+        if self._aside:  # a gap as wide as it is lies where it makes for, not where it looks
+            c, s = np.array(aim) / max(float(np.hypot(*aim)), 1e-9)
+            motions = motions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        else:
+            now[1] = 0.0
         if self._curved:  # it goes further round than straight to a point ahead
             togo = left_to_go(field, cell, path, FREE * float(limits.discs[:, 2].min()))
         first, cost = beam.search(
@@ -122,9 +148,9 @@ class BeamSearch:
             np.array(aim, dtype=float),
             togo,
             COARSE * cell,
-            np.array(now, dtype=float),
+            now,
             float(last),
-            self._motions,
+            motions,
             self._curved,
             limits.acceleration,
             float(gear),
@@ -133,13 +159,12 @@ class BeamSearch:
             STEP,
             *self._size,
         )
-        speed, turn = self._motions[first] if first >= 0 else (0.0, 0.0)
+        best = motions[first] if first >= 0 else np.zeros(3)
         most = limits.acceleration * WINDOW
-        told = now + np.clip(np.array([speed, 0.0, turn]) - now, -most, most)
-        told[1] = 0.0
+        told = now + np.clip(best - now, -most, most)
         if self._curved:
-            told[2] = turn * told[0]
-        return Chosen(told, cost, float(speed))
+            told[2] = best[2] * told[0]
+        return Chosen(told, cost, float(best[0]))
 
 
 def left_to_go(field: Array, cell: float, path: Array, room: float) -> Array:

@@ -67,16 +67,18 @@ class DynamicWindow:
         self.reach = float(limits.high[0]) * horizon
         """[m] as far as a rollout goes: how far ahead the point is that is made for."""
 
-    def ahead(self, progress: Progress, pose: Array, field: Array, cell: float) -> tuple[Array, Array]:
+    def ahead(
+        self, progress: Progress, pose: Array, field: Array, cell: float, reach: float | None = None
+    ) -> tuple[Array, Array]:
         """The way (K, 2) from here on, and the point (2,) of it that is made for, in the frame of the base.
 
-        That is as far ahead as a rollout goes, or nearer where the straight line there would cut a corner.
+        That is `reach` [m] ahead, else as far as a rollout goes; nearer where the straight line would cut a corner.
         """
         from anysim_navigation.kernels.window import line_is_free
 
         path, aim = np.zeros((1, 2)), np.zeros(2)
         for share in AIMS:
-            path, aim = (in_frame(pose, np.atleast_2d(p)) for p in progress.ahead(share * self.reach))
+            path, aim = (in_frame(pose, np.atleast_2d(p)) for p in progress.ahead(share * (reach or self.reach)))
             aim = aim[0]
             if line_is_free(field, float(cell), self.limits.radius, aim[0], aim[1]):
                 break

@@ -273,7 +273,8 @@ class BaseRouter:
             path, self._gear[env] = self._later[env].pop(0)
             progress = self._progress[env] = Progress(path)
             progress.look(pose[:2], 0.0)
-        path, aim = self.window.ahead(progress, pose, field, cell)
+        reach = self.search.reach if self.search is not None and searching else None
+        path, aim = self.window.ahead(progress, pose, field, cell, reach)
         gear = float(self._gear[env])
         if searching:
             assert self.search is not None

@@ -36,7 +36,8 @@ def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
         told = choose(PASSAGE.field(pose), aim, now, movers, pose)
         now = now + np.clip(told - now, -made.acceleration * STEP, made.acceleration * STEP)
         middle = pose[2] + 0.5 * now[2] * STEP
-        pose = pose + STEP * np.array([now[0] * np.cos(middle), now[0] * np.sin(middle), now[2]])
+        c, s = np.cos(middle), np.sin(middle)
+        pose = pose + STEP * np.array([c * now[0] - s * now[1], s * now[0] + c * now[1], now[2]])
         person = person + STEP * pace
         nearest = min(nearest, float(np.hypot(*(person - pose[:2]))) - PERSON - 0.25)
         assert PASSAGE.clearance(pose) > 0.01  # of the 2 cm that motions keep
@@ -45,9 +46,10 @@ def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
     return nearest, float(np.hypot(*(GOAL - pose[:2])))
 
 
-@pytest.mark.parametrize("kind", [BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN])
+@pytest.mark.parametrize("kind", [BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN, BaseKind.HOLONOMIC])
 def test_a_base_leaves_a_passage_for_who_comes_along_it_and_goes_on(kind: BaseKind) -> None:
-    made = limits(kind)._replace(low=np.array([-0.6, 0.0, -1.5]))
+    made = limits(kind)
+    made.low[0] = -0.6
     search = BeamSearch(made)
 
     def choose(field: Array, aim: Array, now: Array, movers: Array, pose: Array) -> Array:
@@ -71,6 +73,31 @@ def test_one_velocity_at_a_time_is_caught_there() -> None:
 
     nearest, left = met(choose, made)
     assert nearest < 0.0 or left > 1.0
+
+
+def test_who_can_goes_sideways_from_who_comes_and_the_others_do_not() -> None:
+    """Somebody comes along the way, a little to the right: to the left at once, and without a turn."""
+    person = np.array([[1.2, -0.1, -0.5, 0.0, PERSON]])
+    asked = Scene().field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD, np.zeros(3), person
+    told = {kind: BeamSearch(limits(kind)).choose(*asked).twist for kind in BaseKind}
+    assert told[BaseKind.HOLONOMIC][1] > 0.25
+    assert told[BaseKind.HOLONOMIC][2] == 0.0
+    assert all(told[kind][1] == 0.0 for kind in BaseKind if kind is not BaseKind.HOLONOMIC)
+
+
+@pytest.mark.parametrize("looks", [0.0, 0.2, 1.0, 2.6])
+def test_who_goes_sideways_gets_through_a_gap_hardly_wider_than_it(looks: float) -> None:
+    """Whichever way it looks; 9 cm to either side, a metre long, of which a scan of 4 cm leaves 5 and the search 3."""
+    walls = Scene(((0.4, -2.0, 1.4, -0.34), (0.4, 0.34, 1.4, 2.0)))
+    search, pose, now = BeamSearch(limits(BaseKind.HOLONOMIC)), np.array([0.0, 0.02, looks]), np.zeros(3)
+    away = np.array([[4.0, 4.0, 0.0, 0.0, PERSON]])
+    for _ in range(50):
+        aim = in_frame(pose, np.array([[min(pose[0] + 1.0, 2.0), 0.0]]))[0]
+        now = search.choose(walls.field(pose), CELL, way_to(aim), aim, now, away).twist
+        c, s = np.cos(pose[2]), np.sin(pose[2])
+        pose = pose + STEP * np.array([c * now[0] - s * now[1], s * now[0] + c * now[1], now[2]])
+        assert walls.clearance(pose) > 0.0
+    assert np.hypot(*(pose[:2] - [2.0, 0.0])) < 0.15
 
 
 def test_a_car_never_turns_tighter_than_it_can() -> None:

@@ -52,7 +52,7 @@ def crossing(engine: str, expert: dict[str, Any], do: list[Any] | None = None, b
     world = WORLD | {"robots": {"base": DRIVES[base]}, "families": {"ann": ann}}
     world |= {"contact_sensors": {"met": {"body": "ann", "against": "base"}}}
     task = {
-        "horizon": 1000,
+        "horizon": 2000,
         "command": {"goal": {"term": "goal_pose", "position": [3.0, 0.0, 0.08]}},
         "observations": {"policy": [{"term": "relative_pose", "a": "base", "b": "goal"}]},
         "expert": {"skill": "navigate", "robot": "base", "goal": "goal", **expert},
@@ -146,6 +146,19 @@ def test_one_that_goes_straight_meets_her() -> None:
     """What the test above shows is the planner's doing."""
     with crossing("mujoco", {}) as env:
         assert gone(env, begun(env), 300)[1] > HARD
+
+
+@pytest.mark.slow
+def test_who_waits_until_a_person_leaves_its_goal_is_not_held_up() -> None:
+    """She stands on it for 24 s, longer than all tries of a base that nobody is in the way of."""
+    do = [{"go_to": [3.0, 0.0], "speed": 0.6}, {"clip": "idle", "seconds": 24.0}, {"go_to": [3.0, 3.0], "speed": 0.6}]
+    with crossing("mujoco", {"planner": "dynamic_window"}, do) as env:
+        policy, dt = begun(env), env.engine.world.physics.control_dt
+        seen, hardest = gone(env, policy, 2000)
+        assert OUTCOMES[policy.skill.outcome[0]] is Outcome.OK
+        waited = (np.hypot(*(seen[:, :2] - [3.0, 0.0]).T) < 1.2).sum() * dt
+        assert waited > 20.0
+        assert hardest == 0.0
 
 
 def test_movers_need_a_planner() -> None:

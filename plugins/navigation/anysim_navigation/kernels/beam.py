@@ -8,12 +8,12 @@ from anysim.conventions import Array
 from anysim.math.compiled import compiled
 from anysim_navigation.kernels.window import SETTLED, between, clearances, distance_at, looks_past, toward
 
-CONTACT, NEAR, TIGHT, TURN, HEADING, LATE, BACK = range(7)
+CONTACT, INTO, NEAR, TIGHT, TURN, HEADING, LATE, BACK = range(8)
 """Places of the weights."""
-X, Y, YAW, SPEED, RATE, SPENT, FIRST = range(7)
+X, Y, YAW, SPEED, ASIDE, RATE, SPENT, FIRST = range(8)
 """Columns of a node: where it is, how fast, what its motions have cost, and the first of them."""
 PLACE, ANGLE = 0.12, 0.4
-"""[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all."""
+"""[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all, and so to their sides."""
 ENOUGH = 0.05
 """[m] from what is made for it is reached: motions that end nearer to it, and begin later for that, are no better."""
 KEPT = 0.02
@@ -27,7 +27,8 @@ def cell_of(node: Array) -> int:
     yaw = math.atan2(math.sin(node[YAW]), math.cos(node[YAW]))
     turned = math.floor(yaw / ANGLE) + 10
     goes = 1 if node[SPEED] > 0.15 else (2 if node[SPEED] < -0.1 else 0)
-    return ((i * 1000 + j) * 20 + turned) * 3 + goes
+    aside = 1 if node[ASIDE] > 0.15 else (2 if node[ASIDE] < -0.15 else 0)
+    return (((i * 1000 + j) * 20 + turned) * 3 + goes) * 3 + aside
 
 
 @compiled
@@ -75,19 +76,19 @@ def search(
 ) -> tuple[int, float]:
     """The motion to begin with, -1 if all run into something; and its cost [m].
 
-    All is in the frame of the base as it is now. `motions` (K, 2) are speeds [m/s] with turns [rad/s], or where
-    `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], twice that from the one numbered `fine`
-    on, and `depth` of them follow one another. `last` [m/s] is the speed of the motion that was chosen last, and
-    `margins` are the distances [m] to movers and to things below which nearness costs.
+    All is in the frame of the base as it is now. `motions` (K, 3) are speeds forward and to the left [m/s] with turns
+    [rad/s], or where `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], twice that from the one
+    numbered `fine` on, and `depth` of them follow one another. `last` [m/s] is the speed of the motion that was chosen
+    last, and `margins` are the distances [m] to movers and to things below which nearness costs.
     """
     count = len(motions)
     floor = min(KEPT, clearances(field, cell, discs, movers[:0], 0.0, 0.0, 0.0, 0.0)[0]) - 1e-6
-    kept = np.zeros((1, 7))
-    kept[0, SPEED], kept[0, RATE] = now[0], now[2]
+    kept = np.zeros((1, FIRST + 1))
+    kept[0, SPEED], kept[0, ASIDE], kept[0, RATE] = now[0], now[1], now[2]
     first, cost, begun = -1, np.inf, 0.0
     for level in range(depth):
         h = step if level < fine else 2.0 * step
-        nodes, scores, found = np.empty((len(kept) * count, 7)), np.empty(len(kept) * count), 0
+        nodes, scores, found = np.empty((len(kept) * count, FIRST + 1)), np.empty(len(kept) * count), 0
         for i in range(len(kept)):
             for k in range(count):
                 node = nodes[found]
@@ -97,21 +98,26 @@ def search(
                     if last * motions[k, 0] < 0.0:
                         node[SPENT] += weights[BACK]
                 free = True
-                for s in range(steps):
+                for n in range(steps):
                     node[SPEED] = toward(node[SPEED], motions[k, 0], acceleration[0] * h)
-                    turn = motions[k, 1] * (node[SPEED] if curved else 1.0)
+                    node[ASIDE] = toward(node[ASIDE], motions[k, 1], acceleration[1] * h)
+                    turn = motions[k, 2] * (node[SPEED] if curved else 1.0)
                     node[RATE] = toward(node[RATE], turn, acceleration[2] * h)
                     middle = node[YAW] + 0.5 * node[RATE] * h
-                    node[X] += node[SPEED] * math.cos(middle) * h
-                    node[Y] += node[SPEED] * math.sin(middle) * h
+                    x, y, yaw = node[X], node[Y], node[YAW]
+                    c, s = math.cos(middle), math.sin(middle)
+                    node[X] += (c * node[SPEED] - s * node[ASIDE]) * h
+                    node[Y] += (s * node[SPEED] + c * node[ASIDE]) * h
                     node[YAW] += node[RATE] * h
-                    time = begun + (s + 1) * h
+                    time = begun + (n + 1) * h
                     room, apart = clearances(field, cell, discs, movers, node[X], node[Y], node[YAW], time)
                     if room < floor:
                         free = False
                         break
                     if apart < 0.0:
+                        stood = clearances(field, cell, discs, movers, x, y, yaw, time)[1]
                         node[SPENT] += weights[CONTACT] * h * (1.0 - apart / 0.2)
+                        node[SPENT] += weights[INTO] * max(0.0, min(0.0, stood) - apart)
                     elif apart < margins[0]:
                         node[SPENT] += weights[NEAR] * h * (1.0 - apart / margins[0])
                     if room < margins[1]:
@@ -125,7 +131,7 @@ def search(
         if found == 0:
             break
         order, seen = np.argsort(scores[:found]), {-1}
-        best, length = np.empty((width, 7)), 0
+        best, length = np.empty((width, FIRST + 1)), 0
         for index in order:
             key = cell_of(nodes[index])
             if key not in seen:
