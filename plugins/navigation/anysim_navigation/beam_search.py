@@ -58,12 +58,36 @@ class Foresight(NamedTuple):
     aim: float = 1.6
 
 
-USUAL: dict[BaseKind, tuple[Weights, Foresight]] = {
-    BaseKind.ACKERMANN: (Weights(near=3.0, back=0.05), Foresight(fine=4, depth=8)),
-    BaseKind.HOLONOMIC: (Weights(into=30.0, tight=0.1, heading=0.0, late=0.15), Foresight(aim=2.4)),
+class Margins(NamedTuple):
+    """Distances [m].
+
+    Attributes:
+        movers: to them, below which it costs to be near.
+        things: to them, likewise.
+        kept: to things at least, by which what is told and what is done may differ.
+    """
+
+    movers: float = 0.4
+    things: float = 0.08
+    kept: float = 0.02
+
+
+class Search(NamedTuple):
+    """What makes the search of a kind of base."""
+
+    weights: Weights = Weights()
+    foresight: Foresight = Foresight()
+    margins: Margins = Margins()
+
+
+USUAL: dict[BaseKind, Search] = {
+    BaseKind.ACKERMANN: Search(Weights(near=3.0, back=0.05), Foresight(fine=4, depth=8)),
+    BaseKind.HOLONOMIC: Search(
+        Weights(into=30.0, tight=0.1, heading=0.0, late=0.15), Foresight(aim=2.4), Margins(kept=0.0)
+    ),
 }
 """Of kinds that differ: a car needs longer to get out of a way, and nowhere when it shunts to and fro; who can go aside
-gets out of one at once, and need not wait before what is narrow."""
+gets out of one at once, need not wait before what is narrow, and swings round no corner there."""
 
 
 class Chosen(NamedTuple):
@@ -85,20 +109,12 @@ class BeamSearch:
         reach: [m] how far ahead the point of the way is that it makes for.
     """
 
-    def __init__(
-        self,
-        limits: BaseLimits,
-        weights: Weights | None = None,
-        foresight: Foresight | None = None,
-        *,
-        width: int = 120,
-        margins: tuple[float, float] = (0.4, 0.08),
-    ) -> None:
+    def __init__(self, limits: BaseLimits, search: Search | None = None, *, width: int = 120) -> None:
         """`width` states are gone on with after each motion."""
         self.limits = limits
-        usual = USUAL.get(limits.kind, (Weights(), Foresight()))
-        self._weights, self._margins = np.array(weights or usual[0], dtype=float), np.array(margins)
-        *size, aim = foresight or usual[1]
+        weights, foresight, margins = search or USUAL.get(limits.kind, Search())
+        self._weights, self._margins = np.array(weights, dtype=float), np.array(margins)
+        *size, aim = foresight
         self._size = *size, width
         self.reach = float(limits.high[0]) * aim
         self._curved = limits.turning_radius > 0.0

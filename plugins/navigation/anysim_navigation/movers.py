@@ -7,6 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError, listing, suggest
+from anysim.math import pose as P
 from anysim.model.world import BodyKind, Entity, EntityKind, JointType, World
 from anysim.task.scene import SceneView
 from anysim_navigation.robot_shape import outline_of
@@ -17,6 +18,9 @@ STANDS = 0.1
 """[m/s] a mover that is slower stands in the way as furniture does."""
 PEOPLE = "avatar"
 """The family whose members walk."""
+CREEPS, LEAST_SHARE, FASTEST = 0.01, 0.1, 0.6
+"""[m/s] above which the velocity of who turns has the direction that it will keep, the least share of their pace that
+they are taken to have meanwhile, and [m/s] the most that is foreseen of that."""
 ASIDE, STRIDE = 0.08, 0.33
 """[m] to their sides and [s] of their way before and behind them, people take more room than as they stand: measured of
 feet, at 0.2 to 0.5 m/s."""
@@ -56,6 +60,9 @@ def _walks(entity: Entity) -> bool:
 class Movers:
     """Entities that move by themselves. Their velocity is that which they have, not one that they were told.
 
+    But people who turn as they set out walk at the squared cosine of what they have yet to turn, of their pace: this is
+    what they are foreseen with.
+
     Attributes:
         names: theirs.
         bodies: all of theirs.
@@ -76,6 +83,7 @@ class Movers:
             outline = outline_of(world, entity.name, world.initial_body_pose[self._roots[k]], top)
             low[k], high[k] = outline.min(axis=0), outline.max(axis=0)
         people = np.array([entity.family == PEOPLE for entity in entities], dtype=bool)
+        self._people = people
         self._offset, radius = 0.5 * (low + high), 0.5 * (high - low).max(axis=1) + ASIDE * people
         each = np.arange(len(entities))
         pairs = each[people & strides]
@@ -99,11 +107,20 @@ class Movers:
         envs, state = self._scene.env_ids[rows], self._scene.state
         place = state.body_pose[envs][:, self._roots, :2] + self._offset - pose[:, None, :2]
         place[~self._scene.presence[envs][:, self._numbers]] += PARKED
-        speed = state.body_twist[envs][:, self._roots, :2][:, self._discs]
-        place = place[:, self._discs] + self._stride[:, None] * speed
+        speed = state.body_twist[envs][:, self._roots, :2]
+        place = place[:, self._discs] + self._stride[:, None] * speed[:, self._discs]
+        speed = (speed * self._growth(speed, P.yaw(state.body_pose[envs][:, self._roots, 3:])))[:, self._discs]
         c, s = np.cos(pose[:, 2])[:, None], np.sin(pose[:, 2])[:, None]
         turned = [
             np.stack([c * v[..., 0] + s * v[..., 1], c * v[..., 1] - s * v[..., 0]], axis=-1) for v in (place, speed)
         ]
         radius = np.broadcast_to(self._radius, place.shape[:2])[..., None]
         return np.concatenate([*turned, radius], axis=-1)
+
+    def _growth(self, speed: Array, yaw: Array) -> Array:
+        """(n, R, 1) by how much velocities (n, R, 2) of who looks to `yaw` (n, R) are going to grow."""
+        pace = np.hypot(speed[..., 0], speed[..., 1])
+        along = (speed[..., 0] * np.cos(yaw) + speed[..., 1] * np.sin(yaw)) / np.maximum(pace, CREEPS)
+        most = np.maximum(FASTEST / np.maximum(pace, CREEPS), 1.0)
+        growth = np.minimum(1.0 / np.maximum(along**2, LEAST_SHARE), most)
+        return np.where(self._people & (pace > CREEPS), growth, 1.0)[..., None]

@@ -132,6 +132,23 @@ def test_people_take_the_room_that_their_feet_take_beside_a_low_base() -> None:
         assert around[4] == tall[4]
 
 
+def test_who_turns_as_she_sets_out_is_foreseen_with_the_pace_that_she_gets_to() -> None:
+    """A quarter turn: while she walks at less than half of her 0.5 m/s, that is what is foreseen, within a fifth."""
+    with crossing("null", {"planner": "dynamic_window"}, [{"go_to": [3.5, -1.2], "speed": 0.5}]) as env:
+        env.reset(seed=1)
+        movers, root = Movers(env.scene, ["ann"], 0.3), env.engine.world.entities[-1].root
+        slow = []
+        for _ in range(60):
+            env.step(np.zeros((1, 3)))
+            env.scene.look(None)
+            pace = np.hypot(*env.engine.get_state().body_twist[0, root, :2])
+            seen = np.hypot(*movers.around(np.array([0]), np.zeros((1, 3)))[0, 0, 2:4])
+            if 0.08 < pace < 0.25:
+                slow.append(seen)
+        assert len(slow) > 3
+        np.testing.assert_allclose(slow, 0.5, atol=0.1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("to", [1.6, 0.0])
 def test_a_base_gets_past_a_person_who_crosses_its_way_or_stops_on_it(to: float) -> None:

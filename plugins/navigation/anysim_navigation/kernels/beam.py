@@ -16,8 +16,8 @@ PLACE, ANGLE = 0.12, 0.4
 """[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all, and so to their sides."""
 ENOUGH = 0.05
 """[m] from what is made for it is reached: motions that end nearer to it, and begin later for that, are no better."""
-KEPT = 0.02
-"""[m] that motions keep from things, by which what is told and what is done may differ."""
+MOVERS, THINGS, KEPT = range(3)
+"""Places of the margins."""
 
 
 @compiled
@@ -79,10 +79,10 @@ def search(
     All is in the frame of the base as it is now. `motions` (K, 3) are speeds forward and to the left [m/s] with turns
     [rad/s], or where `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], twice that from the one
     numbered `fine` on, and `depth` of them follow one another. `last` [m/s] is the speed of the motion that was chosen
-    last, and `margins` are the distances [m] to movers and to things below which nearness costs.
+    last.
     """
     count = len(motions)
-    floor = min(KEPT, clearances(field, cell, discs, movers[:0], 0.0, 0.0, 0.0, 0.0)[0]) - 1e-6
+    floor = min(margins[KEPT], clearances(field, cell, discs, movers[:0], 0.0, 0.0, 0.0, 0.0)[0]) - 1e-6
     kept = np.zeros((1, FIRST + 1))
     kept[0, SPEED], kept[0, ASIDE], kept[0, RATE] = now[0], now[1], now[2]
     first, cost, begun = -1, np.inf, 0.0
@@ -118,10 +118,10 @@ def search(
                         stood = clearances(field, cell, discs, movers, x, y, yaw, time)[1]
                         node[SPENT] += weights[CONTACT] * h * (1.0 - apart / 0.2)
                         node[SPENT] += weights[INTO] * max(0.0, min(0.0, stood) - apart)
-                    elif apart < margins[0]:
-                        node[SPENT] += weights[NEAR] * h * (1.0 - apart / margins[0])
-                    if room < margins[1]:
-                        node[SPENT] += weights[TIGHT] * h * (1.0 - room / margins[1])
+                    elif apart < margins[MOVERS]:
+                        node[SPENT] += weights[NEAR] * h * (1.0 - apart / margins[MOVERS])
+                    if room < margins[THINGS]:
+                        node[SPENT] += weights[TIGHT] * h * (1.0 - room / margins[THINGS])
                     node[SPENT] += weights[TURN] * h * abs(node[RATE])
                 if free:
                     left = remaining(node, aim, togo, size, gear, weights[HEADING])
