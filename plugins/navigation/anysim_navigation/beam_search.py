@@ -27,7 +27,7 @@ class Weights(NamedTuple):
 
     Attributes:
         contact: [m/s] of overlapping a mover; twice as much from 0.2 m on.
-        into: [m/m] of going further into one than if it stood.
+        closer: [m/m] of coming closer to one, who is close, than if it stood.
         near: [m/s] of being close to one, less with the distance.
         tight: [m/s] of being close to things.
         turn: [m/rad]
@@ -37,7 +37,7 @@ class Weights(NamedTuple):
     """
 
     contact: float = 6.0
-    into: float = 0.0
+    closer: float = 0.0
     near: float = 0.72
     tight: float = 0.3
     turn: float = 0.02
@@ -63,11 +63,13 @@ class Margins(NamedTuple):
 
     Attributes:
         movers: to them, below which it costs to be near.
-        things: to them, likewise.
+        close: to movers, within which it costs to come closer.
+        things: to them, below which it costs to be near.
         kept: to things at least, by which what is told and what is done may differ.
     """
 
     movers: float = 0.4
+    close: float = 0.0
     things: float = 0.08
     kept: float = 0.02
 
@@ -83,7 +85,9 @@ class Search(NamedTuple):
 USUAL: dict[BaseKind, Search] = {
     BaseKind.ACKERMANN: Search(Weights(near=3.0, back=0.05), Foresight(fine=4, depth=8)),
     BaseKind.HOLONOMIC: Search(
-        Weights(into=30.0, tight=0.1, heading=0.0, late=0.15), Foresight(aim=2.4), Margins(kept=0.0)
+        Weights(closer=30.0, near=1.0, tight=0.1, heading=0.0, late=0.15),
+        Foresight(aim=2.4),
+        Margins(close=0.12, kept=0.0),
     ),
 }
 """Of kinds that differ: a car needs longer to get out of a way, and nowhere when it shunts to and fro; who can go aside

@@ -108,8 +108,8 @@ class Movers:
         place = state.body_pose[envs][:, self._roots, :2] + self._offset - pose[:, None, :2]
         place[~self._scene.presence[envs][:, self._numbers]] += PARKED
         speed = state.body_twist[envs][:, self._roots, :2]
-        place = place[:, self._discs] + self._stride[:, None] * speed[:, self._discs]
         speed = (speed * self._growth(speed, P.yaw(state.body_pose[envs][:, self._roots, 3:])))[:, self._discs]
+        place = place[:, self._discs] + self._stride[:, None] * speed
         c, s = np.cos(pose[:, 2])[:, None], np.sin(pose[:, 2])[:, None]
         turned = [
             np.stack([c * v[..., 0] + s * v[..., 1], c * v[..., 1] - s * v[..., 0]], axis=-1) for v in (place, speed)

@@ -8,7 +8,7 @@ from anysim.conventions import Array
 from anysim.math.compiled import compiled
 from anysim_navigation.kernels.window import SETTLED, between, clearances, distance_at, looks_past, toward
 
-CONTACT, INTO, NEAR, TIGHT, TURN, HEADING, LATE, BACK = range(8)
+CONTACT, CLOSER, NEAR, TIGHT, TURN, HEADING, LATE, BACK = range(8)
 """Places of the weights."""
 X, Y, YAW, SPEED, ASIDE, RATE, SPENT, FIRST = range(8)
 """Columns of a node: where it is, how fast, what its motions have cost, and the first of them."""
@@ -16,7 +16,7 @@ PLACE, ANGLE = 0.12, 0.4
 """[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all, and so to their sides."""
 ENOUGH = 0.05
 """[m] from what is made for it is reached: motions that end nearer to it, and begin later for that, are no better."""
-MOVERS, THINGS, KEPT = range(3)
+MOVERS, CLOSE, THINGS, KEPT = range(4)
 """Places of the margins."""
 
 
@@ -114,10 +114,11 @@ def search(
                     if room < floor:
                         free = False
                         break
-                    if apart < 0.0:
+                    if apart < margins[CLOSE]:
                         stood = clearances(field, cell, discs, movers, x, y, yaw, time)[1]
+                        node[SPENT] += weights[CLOSER] * max(0.0, min(margins[CLOSE], stood) - apart)
+                    if apart < 0.0:
                         node[SPENT] += weights[CONTACT] * h * (1.0 - apart / 0.2)
-                        node[SPENT] += weights[INTO] * max(0.0, min(0.0, stood) - apart)
                     elif apart < margins[MOVERS]:
                         node[SPENT] += weights[NEAR] * h * (1.0 - apart / margins[MOVERS])
                     if room < margins[THINGS]:
