@@ -156,6 +156,7 @@ class BeamSearch:
         if self._aside:  # a gap as wide as it is lies where it makes for, not where it looks
             c, s = np.array(aim) / max(float(np.hypot(*aim)), 1e-9)
             motions = motions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+            motions = np.clip(motions, limits.low, limits.high)
         else:
             now[1] = 0.0
         if self._curved:  # it goes further round than straight to a point ahead

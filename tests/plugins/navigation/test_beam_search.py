@@ -9,9 +9,9 @@ from anysim.conventions import Array
 from anysim_navigation.beam_search import USUAL, BeamSearch, left_to_go
 from anysim_navigation.dynamic_window import STEP, DynamicWindow
 from anysim_navigation.kernels.window import distance_at
-from anysim_navigation.limits import BaseKind, BaseLimits
+from anysim_navigation.limits import BaseKind, BaseLimits, limits_of
 from anysim_navigation.pose_control import in_frame
-from tests.plugins.navigation.test_local_planning import CELL, SIDE, Scene, limits
+from tests.plugins.navigation.test_local_planning import CELL, DISC, SIDE, Scene, limits
 
 PASSAGE = Scene(((-3.0, -1.0, 6.0, -0.65), (-3.0, 0.65, -1.4, 2.4), (0.0, 0.65, 6.0, 2.4), (-1.4, 1.9, 0.0, 2.4)))
 """A passage of 1.3 m, in which nobody passes a base of 0.5 m, and a bay beside it."""
@@ -83,6 +83,18 @@ def test_who_can_goes_sideways_from_who_comes_and_the_others_do_not() -> None:
     assert told[BaseKind.HOLONOMIC][1] > 0.25
     assert told[BaseKind.HOLONOMIC][2] == 0.0
     assert all(told[kind][1] == 0.0 for kind in BaseKind if kind is not BaseKind.HOLONOMIC)
+
+
+def test_who_goes_sideways_more_slowly_keeps_to_that() -> None:
+    made, rng = limits_of(BaseKind.HOLONOMIC, DISC, speed=0.6, turn=1.5, side=0.2, back=0.3), np.random.default_rng(3)
+    search, now, seen = BeamSearch(made), np.zeros(3), []
+    for _ in range(40):
+        person, aim = np.array([[*rng.uniform(-1, 1, 2), *rng.uniform(-0.5, 0.5, 2), PERSON]]), rng.uniform(-1, 1, 2)
+        now = search.choose(Scene().field(np.zeros(3)), CELL, way_to(aim), aim, now, person).twist
+        seen.append(now)
+    assert (np.array(seen) <= made.high + 1e-12).all()
+    assert (np.array(seen) >= made.low - 1e-12).all()
+    assert np.abs(seen).max(axis=0)[1] == pytest.approx(0.2)
 
 
 def test_who_is_shut_in_by_a_person_does_not_come_closer() -> None:
