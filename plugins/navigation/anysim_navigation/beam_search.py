@@ -83,15 +83,15 @@ class Search(NamedTuple):
 
 
 USUAL: dict[BaseKind, Search] = {
-    BaseKind.ACKERMANN: Search(Weights(near=3.0, back=0.05), Foresight(fine=4, depth=8)),
+    BaseKind.ACKERMANN: Search(Weights(near=3.0, tight=0.1, late=0.15, back=0.05), Foresight(fine=4, depth=8)),
     BaseKind.HOLONOMIC: Search(
         Weights(closer=30.0, near=1.0, tight=0.1, heading=0.0, late=0.15),
         Foresight(aim=2.4),
         Margins(close=0.12, kept=0.0),
     ),
 }
-"""Of kinds that differ: a car needs longer to get out of a way, and nowhere when it shunts to and fro; who can go aside
-gets out of one at once, need not wait before what is narrow, and swings round no corner there."""
+"""Of kinds that differ: a car needs longer to get out of a way, gets nowhere when it shunts to and fro, and does not wait
+before what is narrow; nor does who can go aside, gets out of a way at once, and swings round no corner there."""
 
 
 class Chosen(NamedTuple):
