@@ -90,8 +90,8 @@ USUAL: dict[BaseKind, Search] = {
         Margins(close=0.12, kept=0.0),
     ),
 }
-"""Of kinds that differ: a car needs longer to get out of a way, gets nowhere when it shunts to and fro, and does not wait
-before what is narrow; nor does who can go aside, gets out of a way at once, and swings round no corner there."""
+"""Of kinds that differ. A car needs longer to get out of a way, and gets nowhere when it shunts to and fro; who can go
+aside is out of it at once, and swings round no corner. Neither is to wait before what is narrow."""
 
 
 class Chosen(NamedTuple):
