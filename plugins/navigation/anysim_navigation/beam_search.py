@@ -83,7 +83,11 @@ class Search(NamedTuple):
 
 
 USUAL: dict[BaseKind, Search] = {
-    BaseKind.ACKERMANN: Search(Weights(near=3.0, tight=0.1, late=0.15, back=0.05), Foresight(fine=4, depth=8)),
+    BaseKind.ACKERMANN: Search(
+        Weights(closer=30.0, near=3.0, tight=0.1, late=0.15, back=0.05),
+        Foresight(fine=4, depth=8),
+        Margins(close=0.12),
+    ),
     BaseKind.HOLONOMIC: Search(
         Weights(closer=30.0, near=1.0, tight=0.1, heading=0.0, late=0.15),
         Foresight(aim=2.4),
