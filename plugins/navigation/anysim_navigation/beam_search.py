@@ -84,9 +84,9 @@ class Search(NamedTuple):
 
 USUAL: dict[BaseKind, Search] = {
     BaseKind.ACKERMANN: Search(
-        Weights(closer=30.0, near=3.0, tight=0.1, late=0.15, back=0.05),
+        Weights(contact=12.0, closer=60.0, near=3.0, tight=0.1, late=0.15, back=0.05),
         Foresight(fine=4, depth=8),
-        Margins(close=0.12),
+        Margins(close=0.2),
     ),
     BaseKind.HOLONOMIC: Search(
         Weights(closer=30.0, near=1.0, tight=0.1, heading=0.0, late=0.15),
