@@ -126,16 +126,8 @@ class BeamSearch:
         self._size = *size, width
         self.reach = float(limits.high[0]) * aim
         self._curved = limits.turning_radius > 0.0
-        most = 1.0 / limits.turning_radius if self._curved else float(limits.high[2])
-        speeds = [share * float(limits.high[0] if share >= 0 else -limits.low[0]) for share in SPEEDS]
-        self._motions = np.array(
-            [(v, 0.0, most * turn) for v in speeds for turn in (TURNS if v or not self._curved else (0.0,))]
-        )
         self._aside = limits.kind is BaseKind.HOLONOMIC
-        if self._aside:
-            ways = 2 * np.pi * np.arange(WAYS) / WAYS
-            each = np.stack([np.cos(ways), np.sin(ways), np.zeros(WAYS)], axis=1) * float(limits.high[0])
-            self._motions = np.concatenate([np.zeros((1, 3)), *(share * each for share in PACES)])
+        self._motions = _sideways(limits) if self._aside else _turning(limits)
 
     def choose(
         self,
@@ -190,6 +182,21 @@ class BeamSearch:
         if self._curved:
             told[2] = best[2] * told[0]
         return Chosen(told, cost, float(best[0]))
+
+
+def _turning(limits: BaseLimits) -> Array:
+    """(K, 3) speeds [m/s], none of them sideways, with turns [rad/s], or of what cannot turn on the spot curvatures."""
+    curved = limits.turning_radius > 0.0
+    most = 1.0 / limits.turning_radius if curved else float(limits.high[2])
+    speeds = [share * float(limits.high[0] if share >= 0 else -limits.low[0]) for share in SPEEDS]
+    return np.array([(v, 0.0, most * turn) for v in speeds for turn in (TURNS if v or not curved else (0.0,))])
+
+
+def _sideways(limits: BaseLimits) -> Array:
+    """(K, 3) velocities [m/s] in all directions, the first along x, and none that turns."""
+    ways = 2 * np.pi * np.arange(WAYS) / WAYS
+    each = np.stack([np.cos(ways), np.sin(ways), np.zeros(WAYS)], axis=1) * float(limits.high[0])
+    return np.concatenate([np.zeros((1, 3)), *(share * each for share in PACES)])
 
 
 def left_to_go(field: Array, cell: float, path: Array, room: float) -> Array:

@@ -82,8 +82,7 @@ class Movers:
         for k, entity in enumerate(entities):
             outline = outline_of(world, entity.name, world.initial_body_pose[self._roots[k]], top)
             low[k], high[k] = outline.min(axis=0), outline.max(axis=0)
-        people = np.array([entity.family == PEOPLE for entity in entities], dtype=bool)
-        self._people = people
+        people = self._people = np.array([entity.family == PEOPLE for entity in entities], dtype=bool)
         self._offset, radius = 0.5 * (low + high), 0.5 * (high - low).max(axis=1) + ASIDE * people
         each = np.arange(len(entities))
         pairs = each[people & strides]
@@ -105,10 +104,10 @@ class Movers:
         if not len(self._roots):
             return np.zeros((len(rows), 0, 5))
         envs, state = self._scene.env_ids[rows], self._scene.state
-        place = state.body_pose[envs][:, self._roots, :2] + self._offset - pose[:, None, :2]
+        poses, speed = state.body_pose[envs][:, self._roots], state.body_twist[envs][:, self._roots, :2]
+        place = poses[..., :2] + self._offset - pose[:, None, :2]
         place[~self._scene.presence[envs][:, self._numbers]] += PARKED
-        speed = state.body_twist[envs][:, self._roots, :2]
-        speed = (speed * self._growth(speed, P.yaw(state.body_pose[envs][:, self._roots, 3:])))[:, self._discs]
+        speed = (speed * self._growth(speed, P.yaw(poses[..., 3:])))[:, self._discs]
         place = place[:, self._discs] + self._stride[:, None] * speed
         c, s = np.cos(pose[:, 2])[:, None], np.sin(pose[:, 2])[:, None]
         turned = [

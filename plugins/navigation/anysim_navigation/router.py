@@ -259,8 +259,8 @@ class BaseRouter:
         cell, end = self._grid.cell, self.target[env, :2]
         car = self.limits.kind is BaseKind.ACKERMANN
         close = movers[np.hypot(movers[:, 0], movers[:, 1]) < WITHIN]
-        searching = self.search is not None and len(close) > 0
-        if car and float(np.hypot(*(end - pose[:2]))) < (STOPS_AMONG if searching else CAR_STOPS):
+        search = self.search if len(close) else None
+        if car and float(np.hypot(*(end - pose[:2]))) < (STOPS_AMONG if search else CAR_STOPS):
             self.mode[env], self.twist[env] = Mode.STAND, 0.0  # it cannot turn on the spot, so there is nothing to do
             return
         if progress.left < NEAR and not car and _is_free(movers) and self._straight(field, pose, end):
@@ -269,16 +269,14 @@ class BaseRouter:
             self.twist[env] = self._pose_control.twist(way, P.wrapped(self.target[env, 2] - pose[2]), self.twist[env])
             return
         self.mode[env] = Mode.ROUTE
-        if self._later[env] and progress.left < (AMONG if searching else CUSP):
+        if self._later[env] and progress.left < (AMONG if search else CUSP):
             path, self._gear[env] = self._later[env].pop(0)
             progress = self._progress[env] = Progress(path)
             progress.look(pose[:2], 0.0)
-        reach = self.search.reach if self.search is not None and searching else None
-        path, aim = self.window.ahead(progress, pose, field, cell, reach)
+        path, aim = self.window.ahead(progress, pose, field, cell, search.reach if search else None)
         gear = float(self._gear[env])
-        if searching:
-            assert self.search is not None
-            found = self.search.choose(field, cell, path, aim, now, close, gear, self._meant[env])
+        if search:
+            found = search.choose(field, cell, path, aim, now, close, gear, self._meant[env])
             self.twist[env], self._meant[env] = found.twist, found.speed
             return
         self._meant[env] = 0.0

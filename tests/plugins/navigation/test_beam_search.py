@@ -24,6 +24,13 @@ def way_to(place: Array) -> Array:
     return np.array([[0.0, 0.0], place])
 
 
+def moved(pose: Array, now: Array) -> Array:
+    """Where a base is a step later, by its own velocity."""
+    middle = pose[2] + 0.5 * now[2] * STEP
+    c, s = np.cos(middle), np.sin(middle)
+    return pose + STEP * np.array([c * now[0] - s * now[1], s * now[0] + c * now[1], now[2]])
+
+
 def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
     """[m] the least between the base and a person who comes along the passage, and what is left to the goal."""
     pose, now, nearest = np.zeros(3), np.zeros(3), np.inf
@@ -35,9 +42,7 @@ def met(choose: Chooser, made: BaseLimits) -> tuple[float, float]:
         aim = in_frame(pose, (pose[:2] + np.clip(GOAL - pose[:2], -1.0, 1.0))[None])[0]
         told = choose(PASSAGE.field(pose), aim, now, movers, pose)
         now = now + np.clip(told - now, -made.acceleration * STEP, made.acceleration * STEP)
-        middle = pose[2] + 0.5 * now[2] * STEP
-        c, s = np.cos(middle), np.sin(middle)
-        pose = pose + STEP * np.array([c * now[0] - s * now[1], s * now[0] + c * now[1], now[2]])
+        pose = moved(pose, now)
         person = person + STEP * pace
         nearest = min(nearest, float(np.hypot(*(person - pose[:2]))) - PERSON - 0.25)
         assert PASSAGE.clearance(pose) > 0.01  # of the 2 cm that motions keep
@@ -117,8 +122,7 @@ def test_who_goes_sideways_gets_through_a_gap_hardly_wider_than_it(looks: float)
     for _ in range(50):
         aim = in_frame(pose, np.array([[min(pose[0] + 1.0, 2.0), 0.0]]))[0]
         now = search.choose(walls.field(pose), CELL, way_to(aim), aim, now, away).twist
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        pose = pose + STEP * np.array([c * now[0] - s * now[1], s * now[0] + c * now[1], now[2]])
+        pose = moved(pose, now)
         assert walls.clearance(pose) > 0.0
     assert np.hypot(*(pose[:2] - [2.0, 0.0])) < 0.15
 

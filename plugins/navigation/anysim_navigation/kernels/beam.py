@@ -114,7 +114,7 @@ def search(
                     if room < floor:
                         free = False
                         break
-                    if apart < margins[CLOSE]:
+                    if weights[CLOSER] > 0.0 and apart < margins[CLOSE]:
                         stood = clearances(field, cell, discs, movers, x, y, yaw, time)[1]
                         node[SPENT] += weights[CLOSER] * max(0.0, min(margins[CLOSE], stood) - apart)
                     if apart < 0.0:
