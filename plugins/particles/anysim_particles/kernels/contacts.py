@@ -66,7 +66,7 @@ class Contacts(NamedTuple):
         slot: (C,) int32 the body.
         gap: (C,) [m] distance of the particle's middle from the surface where it is expected.
         normal: (C, 3) away from the surface.
-        place: (C, 3) [m] where the particle was then.
+        offset: (C,) [m] the gap, were the particle at the origin; it grows along the normal.
         friction: (C,) of the surface.
         share: (C,) how much of what is beyond the surface belongs to no nearer surface of about the same direction.
     """
@@ -75,7 +75,7 @@ class Contacts(NamedTuple):
     slot: Array
     gap: Array
     normal: Array
-    place: Array
+    offset: Array
     friction: Array
     share: Array
 
@@ -97,21 +97,22 @@ def expect(b: Proxies, gravity: Array, h: float) -> None:
         angle = math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
         s = math.sin(angle) / angle if angle > 1e-9 else 1.0
         c = (1.0 - math.cos(angle)) / (angle * angle) if angle > 1e-9 else 0.5
-        f = b.frame[g]
+        frame = b.frame
         for column in range(4):
-            x, y, z = (f[column], f[3 + column], f[6 + column]) if column < 3 else (f[9], f[10], f[11])
-            if column == 3:
-                x, y, z = x - b.at[k, 0], y - b.at[k, 1], z - b.at[k, 2]
+            if column < 3:
+                x, y, z = frame[g, column], frame[g, 3 + column], frame[g, 6 + column]
+            else:
+                x, y, z = frame[g, 9] - b.at[k, 0], frame[g, 10] - b.at[k, 1], frame[g, 11] - b.at[k, 2]
             u, v, w = w1 * z - w2 * y, w2 * x - w0 * z, w0 * y - w1 * x
             x += s * u + c * (w1 * w - w2 * v)
             y += s * v + c * (w2 * u - w0 * w)
             z += s * w + c * (w0 * v - w1 * u)
             if column < 3:
-                f[column], f[3 + column], f[6 + column] = x, y, z
+                frame[g, column], frame[g, 3 + column], frame[g, 6 + column] = x, y, z
             else:
-                f[9] = x + b.at[k, 0] + b.twist[k, 0] * h
-                f[10] = y + b.at[k, 1] + b.twist[k, 1] * h
-                f[11] = z + b.at[k, 2] + b.twist[k, 2] * h
+                frame[g, 9] = x + b.at[k, 0] + b.twist[k, 0] * h
+                frame[g, 10] = y + b.at[k, 1] + b.twist[k, 1] * h
+                frame[g, 11] = z + b.at[k, 2] + b.twist[k, 2] * h
         for c3 in range(3):
             far = max(abs(b.high[g, c3] - b.at[k, c3]), abs(b.low[g, c3] - b.at[k, c3]))
             away = abs(b.twist[k, c3]) * h + angle * (far + 1.0 * (b.high[g, c3] - b.low[g, c3]))
@@ -123,25 +124,29 @@ def expect(b: Proxies, gravity: Array, h: float) -> None:
 
 
 @compiled
-def push(b: Proxies, k: int, x: float, y: float, z: float, j0: float, j1: float, j2: float) -> None:
-    """An impulse on body k at a point of the world."""
+def push(impulse: Array, com: Array, k: int, x: float, y: float, z: float, j0: float, j1: float, j2: float) -> None:
+    """Add an impulse on body k at a point of the world to what it got."""
+    u, v, w = x - com[k, 0], y - com[k, 1], z - com[k, 2]
+    impulse[k, 0] += j0
+    impulse[k, 1] += j1
+    impulse[k, 2] += j2
+    impulse[k, 3] += v * j2 - w * j1
+    impulse[k, 4] += w * j0 - u * j2
+    impulse[k, 5] += u * j1 - v * j0
+
+
+@compiled
+def hasten(b: Proxies, k: int, x: float, y: float, z: float, j0: float, j1: float, j2: float) -> None:
+    """Change how a body that yields moves by an impulse at a point of the world."""
     u, v, w = x - b.com[k, 0], y - b.com[k, 1], z - b.com[k, 2]
     t0, t1, t2 = v * j2 - w * j1, w * j0 - u * j2, u * j1 - v * j0
-    i = b.impulse[k]
-    i[0] += j0
-    i[1] += j1
-    i[2] += j2
-    i[3] += t0
-    i[4] += t1
-    i[5] += t2
-    if b.light[k] > 0.0:
-        m, t = b.light[k], b.turns[k]
-        b.twist[k, 0] += m * j0
-        b.twist[k, 1] += m * j1
-        b.twist[k, 2] += m * j2
-        b.twist[k, 3] += t[0, 0] * t0 + t[0, 1] * t1 + t[0, 2] * t2
-        b.twist[k, 4] += t[1, 0] * t0 + t[1, 1] * t1 + t[1, 2] * t2
-        b.twist[k, 5] += t[2, 0] * t0 + t[2, 1] * t1 + t[2, 2] * t2
+    m, t = b.light[k], b.turns
+    b.twist[k, 0] += m * j0
+    b.twist[k, 1] += m * j1
+    b.twist[k, 2] += m * j2
+    b.twist[k, 3] += t[k, 0, 0] * t0 + t[k, 0, 1] * t1 + t[k, 0, 2] * t2
+    b.twist[k, 4] += t[k, 1, 0] * t0 + t[k, 1, 1] * t1 + t[k, 1, 2] * t2
+    b.twist[k, 5] += t[k, 2, 0] * t0 + t[k, 2, 1] * t1 + t[k, 2, 2] * t2
 
 
 @compiled
@@ -151,47 +156,42 @@ def yields(b: Proxies, k: int, x: float, y: float, z: float, n0: float, n1: floa
         return 0.0
     u, v, w = x - b.com[k, 0], y - b.com[k, 1], z - b.com[k, 2]
     t0, t1, t2 = v * n2 - w * n1, w * n0 - u * n2, u * n1 - v * n0
-    t = b.turns[k]
-    a = t[0, 0] * t0 + t[0, 1] * t1 + t[0, 2] * t2
-    c = t[1, 0] * t0 + t[1, 1] * t1 + t[1, 2] * t2
-    d = t[2, 0] * t0 + t[2, 1] * t1 + t[2, 2] * t2
+    t = b.turns
+    a = t[k, 0, 0] * t0 + t[k, 0, 1] * t1 + t[k, 0, 2] * t2
+    c = t[k, 1, 0] * t0 + t[k, 1, 1] * t1 + t[k, 1, 2] * t2
+    d = t[k, 2, 0] * t0 + t[k, 2, 1] * t1 + t[k, 2, 2] * t2
     return b.light[k] + a * t0 + c * t1 + d * t2
 
 
 @compiled
-def speed_at(twist: Array, com: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The velocity of a point of a body."""
-    u, v, w = x - com[0], y - com[1], z - com[2]
+def speed_at(twist: Array, com: Array, k: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """The velocity of a point of body k."""
+    u, v, w = x - com[k, 0], y - com[k, 1], z - com[k, 2]
     return (
-        twist[0] + twist[4] * w - twist[5] * v,
-        twist[1] + twist[5] * u - twist[3] * w,
-        twist[2] + twist[3] * v - twist[4] * u,
+        twist[k, 0] + twist[k, 4] * w - twist[k, 5] * v,
+        twist[k, 1] + twist[k, 5] * u - twist[k, 3] * w,
+        twist[k, 2] + twist[k, 3] * v - twist[k, 4] * u,
     )
 
 
 @compiled
-def gap_now(b: Proxies, contacts: Contacts, c: int, x: float, y: float, z: float, h: float) -> float:
-    """The gap of a contact with the particle at a point, and its body moved by what it got since."""
-    n, f, k = contacts.normal[c], contacts.place[c], contacts.slot[c]
-    gap = contacts.gap[c] + n[0] * (x - f[0]) + n[1] * (y - f[1]) + n[2] * (z - f[2])
-    if b.light[k] > 0.0:
-        u, v, w = speed_at(b.twist[k], b.com[k], x, y, z)
-        p, q, r = speed_at(b.expected[k], b.com[k], x, y, z)
-        gap -= h * (n[0] * (u - p) + n[1] * (v - q) + n[2] * (w - r))
-    return gap
+def receded(b: Proxies, k: int, n0: float, n1: float, n2: float, x: float, y: float, z: float) -> float:
+    """How much faster [m/s] a point of body k goes along a unit vector than was expected, after what it got since."""
+    u, v, w = speed_at(b.twist, b.com, k, x, y, z)
+    p, q, r = speed_at(b.expected, b.com, k, x, y, z)
+    return n0 * (u - p) + n1 * (v - q) + n2 * (w - r)
 
 
 @compiled
 def _more(c: Contacts) -> Contacts:
     size = c.slot.shape[0]
-    slot, gap = np.empty(2 * size, dtype=np.int32), np.empty(2 * size)
-    normal, place = np.empty((2 * size, 3)), np.empty((2 * size, 3))
-    friction, share = np.empty(2 * size), np.empty(2 * size)
+    slot, normal = np.empty(2 * size, dtype=np.int32), np.empty((2 * size, 3))
+    gap, offset, friction, share = np.empty(2 * size), np.empty(2 * size), np.empty(2 * size), np.empty(2 * size)
     for i in range(size):
-        slot[i], gap[i], friction[i], share[i] = c.slot[i], c.gap[i], c.friction[i], c.share[i]
+        slot[i], gap[i], offset[i], friction[i], share[i] = c.slot[i], c.gap[i], c.offset[i], c.friction[i], c.share[i]
         for k in range(3):
-            normal[i, k], place[i, k] = c.normal[i, k], c.place[i, k]
-    return Contacts(c.begin, slot, gap, normal, place, friction, share)
+            normal[i, k] = c.normal[i, k]
+    return Contacts(c.begin, slot, gap, normal, offset, friction, share)
 
 
 @compiled
@@ -237,23 +237,26 @@ def find_contacts(
                 or b.high[g, 2] + reach < z
             ):
                 continue
-            f = b.frame[g]
-            u, v, w = x - f[9], y - f[10], z - f[11]
-            u, v, w = (f[0] * u + f[3] * v + f[6] * w, f[1] * u + f[4] * v + f[7] * w, f[2] * u + f[5] * v + f[8] * w)
+            f = b.frame
+            u, v, w = x - f[g, 9], y - f[g, 10], z - f[g, 11]
+            u, v, w = (
+                f[g, 0] * u + f[g, 3] * v + f[g, 6] * w,
+                f[g, 1] * u + f[g, 4] * v + f[g, 7] * w,
+                f[g, 2] * u + f[g, 5] * v + f[g, 8] * w,
+            )
             if geoms.kind[g] > CYLINDER:
                 gap, p0, p1, p2 = meshed(triangles, triangles.root[geoms.mesh[g]], u, v, w, 3 * reach, stack, near)
             else:
-                s = geoms.size[g]
-                gap, p0, p1, p2 = convex(geoms.kind[g], s[0], s[1], s[2], u, v, w)
+                s = geoms.size
+                gap, p0, p1, p2 = convex(geoms.kind[g], s[g, 0], s[g, 1], s[g, 2], u, v, w)
             if not gap < reach:
                 continue
             if count == contacts.slot.shape[0]:
                 contacts = _more(contacts)
             contacts.slot[count], contacts.gap[count], contacts.friction[count] = b.slot[g], gap, b.friction[g]
-            contacts.normal[count, 0] = f[0] * p0 + f[1] * p1 + f[2] * p2
-            contacts.normal[count, 1] = f[3] * p0 + f[4] * p1 + f[5] * p2
-            contacts.normal[count, 2] = f[6] * p0 + f[7] * p1 + f[8] * p2
-            contacts.place[count, 0], contacts.place[count, 1], contacts.place[count, 2] = x, y, z
+            contacts.normal[count, 0] = f[g, 0] * p0 + f[g, 1] * p1 + f[g, 2] * p2
+            contacts.normal[count, 1] = f[g, 3] * p0 + f[g, 4] * p1 + f[g, 5] * p2
+            contacts.normal[count, 2] = f[g, 6] * p0 + f[g, 7] * p1 + f[g, 8] * p2
             count += 1
         for s_ in range(b.thick.shape[0]):
             far = reach + b.thick[s_]
@@ -273,15 +276,15 @@ def find_contacts(
                 contacts = _more(contacts)
             contacts.slot[count], contacts.gap[count], contacts.friction[count] = k, gap - b.thick[s_], 0.0
             contacts.normal[count, 0], contacts.normal[count, 1], contacts.normal[count, 2] = p0, p1, p2
-            contacts.place[count, 0], contacts.place[count, 1], contacts.place[count, 2] = x, y, z
             count += 1
+        m = contacts.normal
         for c in range(contacts.begin[i], count):
+            contacts.offset[c] = contacts.gap[c] - (m[c, 0] * x + m[c, 1] * y + m[c, 2] * z)
             share = 1.0
             for o in range(contacts.begin[i], count):
                 nearer = contacts.gap[o] < contacts.gap[c] or (contacts.gap[o] == contacts.gap[c] and o < c)
                 if nearer:
-                    a, d = contacts.normal[c], contacts.normal[o]
-                    along = max(0.0, a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
+                    along = max(0.0, m[c, 0] * m[o, 0] + m[c, 1] * m[o, 1] + m[c, 2] * m[o, 2])
                     share *= 1.0 - along * along
             contacts.share[c] = share
     contacts.begin[n] = count
@@ -293,8 +296,8 @@ def no_contacts(n: int) -> Contacts:
     """Room for the contacts of n particles."""
     size = 2 * n + 16
     begin, slot = np.zeros(n + 1, dtype=np.int64), np.empty(size, dtype=np.int32)
-    normal, place = np.empty((size, 3)), np.empty((size, 3))
-    return Contacts(begin, slot, np.empty(size), normal, place, np.empty(size), np.empty(size))
+    gap, offset, friction, share = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    return Contacts(begin, slot, gap, np.empty((size, 3)), offset, friction, share)
 
 
 @compiled

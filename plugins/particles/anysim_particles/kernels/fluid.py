@@ -16,9 +16,10 @@ from anysim_particles.kernels.contacts import (
     Proxies,
     expect,
     find_contacts,
-    gap_now,
+    hasten,
     no_contacts,
     push,
+    receded,
     speed_at,
     weigh,
     yields,
@@ -46,6 +47,34 @@ def beyond(gap: float, reach: float) -> tuple[float, float]:
     whole = 128.0 / 315.0
     below = u * (1.0 - t * (4.0 / 3.0 - t * (6.0 / 5.0 - t * (4.0 / 7.0 - t / 9.0))))
     return 315.0 / 256.0 * (whole - below), -315.0 / 256.0 / reach * (1.0 - t) ** 4
+
+
+@compiled
+def differences(p: Array, pairs: Array, count: int, x: Array, y: Array, z: Array) -> None:
+    """From the second of each pair to the first [m], into arrays by component."""
+    for q in range(count):
+        i, j = pairs[q, 0], pairs[q, 1]
+        x[q] = p[i, 0] - p[j, 0]
+        y[q] = p[i, 1] - p[j, 1]
+        z[q] = p[i, 2] - p[j, 2]
+
+
+@compiled
+def pulls(x: Array, y: Array, z: Array, kernel: Array, count: int, reach: float, steep: float) -> None:
+    """Differences of pairs [m] become gradients of the kernel [1/m]; its values are written too.
+
+    Four arrays and no branch: so the compiler takes several pairs at once, and what comes out is the same.
+    """
+    for q in range(count):
+        e, f, g = x[q], y[q], z[q]
+        d2 = e * e + f * f + g * g
+        u = max(1.0 - d2 / (reach * reach), 0.0)
+        kernel[q] = u * u * u
+        g = 1e-9 if d2 < 1e-18 else g  # who is in one place goes apart
+        d = max(math.sqrt(d2), 1e-9)
+        near = max(1.0 - d / reach, 0.0)
+        a = -steep * near * near / d
+        x[q], y[q], z[q] = a * e, a * f, a * g
 
 
 @compiled
@@ -84,9 +113,11 @@ def fluid_step(
     order = sorted_by_cell(x_, n, REACH * spacing)
     x, v = in_order(x_, order), in_order(v_, order)
     h, reach = dt / substeps, REACH * spacing
+    light, impulse, com = b.light, b.impulse, b.com
     still = b.com.shape[0] - 1
     p, near = np.empty((n, 3)), no_contacts(n)
-    pairs, towards = np.empty((24 * n + 64, 2), dtype=np.int32), np.empty((1, 3))
+    pairs = np.empty((24 * n + 64, 2), dtype=np.int32)
+    to_x, to_y, to_z, kernel = np.empty(0), np.empty(0), np.empty(0), np.empty(0)
     density, square, along = np.empty(n), np.empty(n), np.empty((n, 3))
     steep = STEEP / reach
     soft = SOFT * 6 * (steep / 4) ** 2
@@ -99,34 +130,25 @@ def fluid_step(
         weigh(x, n, mass * h, gravity, received)
         pairs, count = near_pairs(p, n, reach, pairs)
         near = find_contacts(p, n, reach, geoms, triangles, b, near)
-        if towards.shape[0] < count:
-            towards = np.empty((pairs.shape[0], 3))
-        some = near.begin[n]
-        shares, slopes = np.empty(some), np.empty(some)
+        if kernel.shape[0] < count:
+            size = pairs.shape[0]
+            to_x, to_y, to_z, kernel = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+        begin, slot, normal, offset, share = near.begin, near.slot, near.normal, near.offset, near.share
+        slopes = np.empty(begin[n])
         for _ in range(iterations):
+            differences(p, pairs, count, to_x, to_y, to_z)
+            pulls(to_x, to_y, to_z, kernel, count, reach, steep)
             for i in range(n):
                 density[i], square[i] = 1.0, 0.0
                 along[i, 0] = along[i, 1] = along[i, 2] = 0.0
             for q in range(count):
                 i, j = pairs[q, 0], pairs[q, 1]
-                e, f, g = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
-                d2 = e * e + f * f + g * g
-                u = d2 / (reach * reach)
-                if u >= 1.0:
-                    towards[q, 0] = towards[q, 1] = towards[q, 2] = 0.0
-                    continue
-                kernel = (1.0 - u) ** 3
-                density[i] += kernel
-                density[j] += kernel
-                d = math.sqrt(d2)
-                if d < 1e-9:
-                    e, f, g, d = 0.0, 0.0, 1e-9, 1e-9
-                slope = -steep * (1.0 - d / reach) ** 2
-                a = slope / d
-                e, f, g = a * e, a * f, a * g
-                towards[q, 0], towards[q, 1], towards[q, 2] = e, f, g
-                square[i] += slope * slope
-                square[j] += slope * slope
+                e, f, g = to_x[q], to_y[q], to_z[q]
+                both = e * e + f * f + g * g
+                density[i] += kernel[q]
+                density[j] += kernel[q]
+                square[i] += both
+                square[j] += both
                 along[i, 0] += e
                 along[i, 1] += f
                 along[i, 2] += g
@@ -135,59 +157,66 @@ def fluid_step(
                 along[j, 2] -= g
             for i in range(n):
                 full, rest = density[i] / LATTICE, 0.0
-                for c in range(near.begin[i], near.begin[i + 1]):
-                    gap = gap_now(b, near, c, p[i, 0], p[i, 1], p[i, 2], h)
-                    shares[c], slopes[c] = beyond(gap, reach)
-                    full += near.share[c] * shares[c]
-                    m = near.normal[c]
-                    s = near.share[c] * slopes[c]
+                for c in range(begin[i], begin[i + 1]):
+                    k, n0, n1, n2 = slot[c], normal[c, 0], normal[c, 1], normal[c, 2]
+                    gap = offset[c] + n0 * p[i, 0] + n1 * p[i, 1] + n2 * p[i, 2]
+                    if light[k] > 0.0:
+                        gap -= h * receded(b, k, n0, n1, n2, p[i, 0], p[i, 1], p[i, 2])
+                    filled, s = beyond(gap, reach)
+                    full += share[c] * filled
+                    s *= share[c]
                     slopes[c] = s
-                    for k in range(3):
-                        along[i, k] += s * m[k]
-                    give = mass * yields(b, near.slot[c], p[i, 0], p[i, 1], p[i, 2], m[0], m[1], m[2])
-                    rest += s * s * give
+                    along[i, 0] += s * n0
+                    along[i, 1] += s * n1
+                    along[i, 2] += s * n2
+                    if light[k] > 0.0:
+                        rest += s * s * mass * yields(b, k, p[i, 0], p[i, 1], p[i, 2], n0, n1, n2)
                 total = square[i] + rest + along[i, 0] ** 2 + along[i, 1] ** 2 + along[i, 2] ** 2
                 density[i] = -max(full - 1.0, 0.0) / (total + soft)  # from here on the multiplier
             for q in range(count):
                 i, j = pairs[q, 0], pairs[q, 1]
                 both = density[i] + density[j]
-                if both == 0.0:
-                    continue
-                for k in range(3):
-                    move = both * towards[q, k]
-                    p[i, k] += move
-                    p[j, k] -= move
+                e, f, g = both * to_x[q], both * to_y[q], both * to_z[q]
+                p[i, 0] += e
+                p[i, 1] += f
+                p[i, 2] += g
+                p[j, 0] -= e
+                p[j, 1] -= f
+                p[j, 2] -= g
             for i in range(n):
-                for c in range(near.begin[i], near.begin[i + 1]):
+                for c in range(begin[i], begin[i + 1]):
                     move = density[i] * slopes[c]
-                    m, k = near.normal[c], near.slot[c]
-                    p[i, 0] += move * m[0]
-                    p[i, 1] += move * m[1]
-                    p[i, 2] += move * m[2]
-                    gap = gap_now(b, near, c, p[i, 0], p[i, 1], p[i, 2], h)
+                    k, n0, n1, n2 = slot[c], normal[c, 0], normal[c, 1], normal[c, 2]
+                    p[i, 0] += move * n0
+                    p[i, 1] += move * n1
+                    p[i, 2] += move * n2
+                    gap = offset[c] + n0 * p[i, 0] + n1 * p[i, 1] + n2 * p[i, 2]
+                    if light[k] > 0.0:
+                        gap -= h * receded(b, k, n0, n1, n2, p[i, 0], p[i, 1], p[i, 2])
                     if gap < CLOSEST * spacing:
-                        inverse = mass * yields(b, k, p[i, 0], p[i, 1], p[i, 2], m[0], m[1], m[2])
-                        more = (CLOSEST * spacing - gap) / (1.0 + inverse)
-                        p[i, 0] += more * m[0]
-                        p[i, 1] += more * m[1]
-                        p[i, 2] += more * m[2]
+                        more = CLOSEST * spacing - gap
+                        if light[k] > 0.0:
+                            more /= 1.0 + mass * yields(b, k, p[i, 0], p[i, 1], p[i, 2], n0, n1, n2)
+                        p[i, 0] += more * n0
+                        p[i, 1] += more * n1
+                        p[i, 2] += more * n2
                         move += more
                     if move != 0.0:
                         j = -mass * move / h
-                        push(b, k, x[i, 0], x[i, 1], x[i, 2], j * m[0], j * m[1], j * m[2])
+                        push(impulse, com, k, x[i, 0], x[i, 1], x[i, 2], j * n0, j * n1, j * n2)
+                        if light[k] > 0.0:
+                            hasten(b, k, x[i, 0], x[i, 1], x[i, 2], j * n0, j * n1, j * n2)
         for i in range(n):
             for k in range(3):
                 v[i, k] = (p[i, k] - x[i, k]) / h
         # velocities of neighbours come nearer to each other; what is between two is the same for both
         for i in range(n):
             along[i, 0] = along[i, 1] = along[i, 2] = 0.0
+        differences(p, pairs, count, to_x, to_y, to_z)
+        pulls(to_x, to_y, to_z, kernel, count, reach, steep)
         for q in range(count):
             i, j = pairs[q, 0], pairs[q, 1]
-            e, f, g = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
-            u = (e * e + f * f + g * g) / (reach * reach)
-            if u >= 1.0:
-                continue
-            a = smoothing * (1.0 - u) ** 3 / LATTICE
+            a = smoothing / LATTICE * kernel[q]
             for k in range(3):
                 change = a * (v[j, k] - v[i, k])
                 along[i, k] += change
@@ -196,21 +225,27 @@ def fluid_step(
             for k in range(3):
                 v[i, k] += along[i, k]
             if drag > 0.0:
-                for c in range(near.begin[i], near.begin[i + 1]):
-                    gap = gap_now(b, near, c, p[i, 0], p[i, 1], p[i, 2], h)
+                for c in range(begin[i], begin[i + 1]):
+                    k, n0, n1, n2 = slot[c], normal[c, 0], normal[c, 1], normal[c, 2]
+                    gap = offset[c] + n0 * p[i, 0] + n1 * p[i, 1] + n2 * p[i, 2]
+                    if light[k] > 0.0:
+                        gap -= h * receded(b, k, n0, n1, n2, p[i, 0], p[i, 1], p[i, 2])
                     if gap > spacing:
                         continue
-                    k, m = near.slot[c], near.normal[c]
-                    d0, d1, d2 = speed_at(b.twist[k], b.com[k], x[i, 0], x[i, 1], x[i, 2])
-                    d0, d1, d2 = v[i, 0] - d0, v[i, 1] - d1, v[i, 2] - d2
-                    a = d0 * m[0] + d1 * m[1] + d2 * m[2]
-                    d0, d1, d2 = d0 - a * m[0], d1 - a * m[1], d2 - a * m[2]
-                    a = drag * near.share[c] / (1.0 + mass * b.light[k])
+                    d0, d1, d2 = v[i, 0], v[i, 1], v[i, 2]
+                    if k != still:
+                        s0, s1, s2 = speed_at(b.twist, b.com, k, x[i, 0], x[i, 1], x[i, 2])
+                        d0, d1, d2 = d0 - s0, d1 - s1, d2 - s2
+                    a = d0 * n0 + d1 * n1 + d2 * n2
+                    d0, d1, d2 = d0 - a * n0, d1 - a * n1, d2 - a * n2
+                    a = drag * share[c] / (1.0 + mass * light[k])
                     v[i, 0] -= a * d0
                     v[i, 1] -= a * d1
                     v[i, 2] -= a * d2
                     a *= mass
-                    push(b, k, x[i, 0], x[i, 1], x[i, 2], a * d0, a * d1, a * d2)
+                    push(impulse, com, k, x[i, 0], x[i, 1], x[i, 2], a * d0, a * d1, a * d2)
+                    if light[k] > 0.0:
+                        hasten(b, k, x[i, 0], x[i, 1], x[i, 2], a * d0, a * d1, a * d2)
         for i in range(n):
             for k in range(3):
                 x[i, k] = p[i, k]

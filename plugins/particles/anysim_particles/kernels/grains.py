@@ -15,9 +15,10 @@ from anysim_particles.kernels.contacts import (
     Proxies,
     expect,
     find_contacts,
-    gap_now,
+    hasten,
     no_contacts,
     push,
+    receded,
     speed_at,
     weigh,
     yields,
@@ -82,7 +83,7 @@ def grain_step(
         for k in range(beads):
             order[a * beads + k] = by_grain[a] * beads + k
     x, v = in_order(x_, order), in_order(v_, order)
-    h = dt / substeps
+    h, light, impulse, com = dt / substeps, b.light, b.impulse, b.com
     still = b.com.shape[0] - 1
     p, near = in_order(x_, order), no_contacts(n)
     pairs, count = np.empty((8 * n + 64, 2), dtype=np.int32), 0
@@ -102,7 +103,8 @@ def grain_step(
             used = far
             pairs, count = near_pairs(p, n, 2 * radius + 2 * skin, pairs)
         near = find_contacts(p, n, radius + far, geoms, triangles, b, near)
-        some = near.begin[n]
+        begin, slot, normal, offset = near.begin, near.slot, near.normal, near.offset
+        some = begin[n]
         if touched.shape[0] < some:
             touched, dragged = np.empty(2 * some), np.empty(2 * some)
         if load.shape[0] < count:
@@ -148,23 +150,29 @@ def grain_step(
                 p[j, 1] -= m1
                 p[j, 2] -= m2
             for i in range(n):
-                for c in range(near.begin[i], near.begin[i + 1]):
-                    depth = radius - gap_now(b, near, c, p[i, 0], p[i, 1], p[i, 2], h)
+                for c in range(begin[i], begin[i + 1]):
+                    k, n0, n1, n2 = slot[c], normal[c, 0], normal[c, 1], normal[c, 2]
+                    gap = offset[c] + n0 * p[i, 0] + n1 * p[i, 1] + n2 * p[i, 2]
+                    if light[k] > 0.0:
+                        gap -= h * receded(b, k, n0, n1, n2, p[i, 0], p[i, 1], p[i, 2])
+                    depth = radius - gap
                     if depth <= 0.0:
                         continue
-                    k, m = near.slot[c], near.normal[c]
-                    n0, n1, n2 = m[0], m[1], m[2]
-                    s0, s1, s2 = speed_at(b.twist[k], b.com[k], x[i, 0], x[i, 1], x[i, 2])
+                    s0, s1, s2, give = 0.0, 0.0, 0.0, 0.0
+                    if k != still:
+                        s0, s1, s2 = speed_at(b.twist, b.com, k, x[i, 0], x[i, 1], x[i, 2])
                     u, w, z = p[i, 0] - x[i, 0] - s0 * h, p[i, 1] - x[i, 1] - s1 * h, p[i, 2] - x[i, 2] - s2 * h
                     parting = u * n0 + w * n1 + z * n2
-                    give = mass * yields(b, k, x[i, 0], x[i, 1], x[i, 2], n0, n1, n2)
+                    if light[k] > 0.0:
+                        give = mass * yields(b, k, x[i, 0], x[i, 1], x[i, 2], n0, n1, n2)
                     move = min(depth, max(0.0, slow * h - parting)) / (1.0 + give)
                     touched[c] += move
                     u, w, z = u - parting * n0, w - parting * n1, z - parting * n2
                     slide = math.sqrt(u * u + w * w + z * z)
                     back = 0.0
                     if slide > 0.0:
-                        give = mass * yields(b, k, x[i, 0], x[i, 1], x[i, 2], u / slide, w / slide, z / slide)
+                        if light[k] > 0.0:
+                            give = mass * yields(b, k, x[i, 0], x[i, 1], x[i, 2], u / slide, w / slide, z / slide)
                         left = max(friction, near.friction[c]) * touched[c] - dragged[c]
                         rub = min(slide / (1.0 + give), max(0.0, left))
                         dragged[c] += rub
@@ -174,7 +182,9 @@ def grain_step(
                     p[i, 1] += m1
                     p[i, 2] += m2
                     a = -mass / h
-                    push(b, k, x[i, 0], x[i, 1], x[i, 2], a * m0, a * m1, a * m2)
+                    push(impulse, com, k, x[i, 0], x[i, 1], x[i, 2], a * m0, a * m1, a * m2)
+                    if light[k] > 0.0:
+                        hasten(b, k, x[i, 0], x[i, 1], x[i, 2], a * m0, a * m1, a * m2)
             if beads > 1:
                 _hold(p, grains, beads, apart)
         for i in range(n):

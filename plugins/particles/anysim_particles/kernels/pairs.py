@@ -7,8 +7,8 @@ import numpy as np
 from anysim.conventions import Array
 from anysim_particles.kernels.compiling import compiled
 
-STEPS = 13
-"""Of the 26 cells around a cell half are looked at: pairs are found once."""
+ROWS = 5
+"""Of three cells each, of the nine around a cell and with it: pairs are found once."""
 
 
 @compiled
@@ -113,24 +113,31 @@ def near_pairs(p: Array, n: int, reach: float, pairs: Array) -> tuple[Array, int
     home, order = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     begin = np.zeros(sides[0] * sides[1] * sides[2] + 1, dtype=np.int64)
     _start(at, n, sides, home, begin, order)
-    count, square = 0, reach * reach
+    sorted_p, count, square = in_order(p, order), 0, reach * reach
     for a in range(n):
-        i = order[a]
-        x, y, z = p[i, 0], p[i, 1], p[i, 2]
-        for step in range(STEPS + 1):
-            s = step + STEPS  # the second half of the 27 cells, this one first
-            dx, dy, dz = s % 3 - 1, (s // 3) % 3 - 1, s // 9 - 1
-            u, v, w = at[i, 0] + dx, at[i, 1] + dy, at[i, 2] + dz
-            c = u % sides[0] + sides[0] * (v % sides[1] + sides[1] * (w % sides[2]))
-            first = a + 1 if step == 0 else begin[c]
-            for b in range(first, begin[c + 1]):
-                j = order[b]
-                if at[j, 0] != u or at[j, 1] != v or at[j, 2] != w:
-                    continue
-                e, f, g = x - p[j, 0], y - p[j, 1], z - p[j, 2]
-                if e * e + f * f + g * g < square:
-                    if count == pairs.shape[0]:
-                        pairs = _grown(pairs)
-                    pairs[count, 0], pairs[count, 1] = i, j
-                    count += 1
+        i, c = order[a], home[order[a]]
+        x, y, z = sorted_p[a, 0], sorted_p[a, 1], sorted_p[a, 2]
+        u, v, w = c % sides[0], c // sides[0] % sides[1], c // (sides[0] * sides[1])
+        for row in range(ROWS):  # of three cells; of its own those that come after it
+            dy, dz = (row, 0) if row < 2 else (row - 3, 1)
+            line = sides[0] * ((v + dy) % sides[1] + sides[1] * ((w + dz) % sides[2]))
+            west, east = u - (row > 0), u + 1
+            for beyond in range(2):  # what of a row is beyond one end of the grid is at the other
+                if beyond == 0:
+                    first, last = max(west, 0), min(east, sides[0] - 1)
+                elif west < 0:
+                    first = last = sides[0] - 1
+                elif east == sides[0]:
+                    first = last = 0
+                else:
+                    break
+                start, stop = begin[line + first], begin[line + last + 1]
+                if row == 0 and beyond == 0:
+                    start = a + 1
+                while count + stop - start > pairs.shape[0]:
+                    pairs = _grown(pairs)
+                for b in range(start, stop):  # without a branch: one in eight is near, and which cannot be foretold
+                    e, f, g = x - sorted_p[b, 0], y - sorted_p[b, 1], z - sorted_p[b, 2]
+                    pairs[count, 0], pairs[count, 1] = i, order[b]
+                    count += e * e + f * f + g * g < square
     return pairs, count
