@@ -34,6 +34,7 @@ class Weights(NamedTuple):
         heading: [m/rad] its end looks past what is made for.
         late: [1/s] of what is left, while it is.
         back: [m] of a speed against that of the motion that was chosen last.
+        doubt: [1/s] by which a contact weighs less the later it would be: people turn.
     """
 
     contact: float = 6.0
@@ -44,6 +45,7 @@ class Weights(NamedTuple):
     heading: float = 0.1
     late: float = 0.05
     back: float = 0.0
+    doubt: float = 0.0
 
 
 class Foresight(NamedTuple):
@@ -75,18 +77,27 @@ class Margins(NamedTuple):
 
 
 class Search(NamedTuple):
-    """What makes the search of a kind of base."""
+    """What makes the search of a kind of base.
+
+    Attributes:
+        keeps: whether it goes on with what it chose last until it finds something better.
+        wary: whether it expects people who stand and turn to walk off.
+    """
 
     weights: Weights = Weights()
     foresight: Foresight = Foresight()
     margins: Margins = Margins()
+    keeps: bool = False
+    wary: bool = False
 
 
 USUAL: dict[BaseKind, Search] = {
     BaseKind.ACKERMANN: Search(
-        Weights(contact=12.0, closer=60.0, near=3.0, tight=0.1, late=0.15, back=0.05),
+        Weights(contact=40.0, closer=60.0, near=3.0, tight=0.1, late=0.15, back=0.05, doubt=0.4),
         Foresight(fine=4, depth=8),
         Margins(close=0.2),
+        keeps=True,
+        wary=True,
     ),
     BaseKind.HOLONOMIC: Search(
         Weights(closer=30.0, near=1.0, tight=0.1, heading=0.0, late=0.15),
@@ -94,16 +105,17 @@ USUAL: dict[BaseKind, Search] = {
         Margins(close=0.12, kept=0.0),
     ),
 }
-"""Of kinds that differ. A car needs longer to get out of a way, and gets nowhere when it shunts to and fro; who can go
-aside is out of it at once, and swings round no corner. Neither is to wait before what is narrow."""
+"""Of kinds that differ. A car needs longer to get out of a way, and gets nowhere when it shunts to and fro, as it does
+when each time another of two plans is found; who can go aside is out of it at once, and swings round no corner. Neither
+is to wait before what is narrow."""
 
 
 class Chosen(NamedTuple):
-    """Velocities (3,), their cost [m], inf where all run into something, and the speed [m/s] of the whole motion."""
+    """Velocities (3,), their cost [m], inf where all run into something, and the plan that they belong to."""
 
     twist: Array
     cost: float
-    speed: float
+    plan: Array
 
 
 class BeamSearch:
@@ -115,15 +127,18 @@ class BeamSearch:
 
     Attributes:
         reach: [m] how far ahead the point of the way is that it makes for.
+        wary: whether people who stand and turn are expected to walk off.
+        no_plan: (1 + depth,) int64, the plan of who has none: steps of its first motion that are past, and motions.
     """
 
     def __init__(self, limits: BaseLimits, search: Search | None = None, *, width: int = 120) -> None:
         """`width` states are gone on with after each motion."""
         self.limits = limits
-        weights, foresight, margins = search or USUAL.get(limits.kind, Search())
+        weights, foresight, margins, self._keeps, self.wary = search or USUAL.get(limits.kind, Search())
         self._weights, self._margins = np.array(weights, dtype=float), np.array(margins)
         *size, aim = foresight
         self._size = *size, width
+        self.no_plan = np.array([0] + [-1] * foresight.depth)
         self.reach = float(limits.high[0]) * aim
         self._curved = limits.turning_radius > 0.0
         self._aside = limits.kind is BaseKind.HOLONOMIC
@@ -138,12 +153,12 @@ class BeamSearch:
         now: Array,
         movers: Array,
         gear: float = 0.0,
-        last: float = 0.0,
+        plan: Array | None = None,
     ) -> Chosen:
         """What is best now.
 
-        The arguments are those of `DynamicWindow.choose`; `gear` is -1 where the way is to be gone backwards, `last`
-        [m/s] the speed of what was chosen last.
+        The arguments are those of `DynamicWindow.choose`; `gear` is -1 where the way is to be gone backwards, `plan`
+        what was chosen a step ago.
         """
         from anysim_navigation.kernels import beam
 
@@ -157,7 +172,13 @@ class BeamSearch:
             now[1] = 0.0
         if self._curved:  # it goes further round than straight to a point ahead
             togo = left_to_go(field, cell, path, FREE * float(limits.discs[:, 2].min()))
-        first, cost = beam.search(
+        past, *meant = self.no_plan if plan is None else plan
+        last = float(self._motions[meant[0], 0]) if meant[0] >= 0 else 0.0
+        if not self._keeps:
+            past, *meant = self.no_plan
+        elif past == self._size[0]:  # its first motion is over
+            past, meant = 0, [*meant[1:], -1]
+        chosen, cost = beam.search(
             field,
             float(cell),
             limits.discs,
@@ -166,22 +187,27 @@ class BeamSearch:
             togo,
             COARSE * cell,
             now,
-            float(last),
+            last,
             motions,
             self._curved,
             limits.acceleration,
             float(gear),
+            np.array(meant),
+            int(past),
             self._weights,
             self._margins,
             STEP,
             *self._size,
         )
-        best = motions[first] if first >= 0 else np.zeros(3)
+        if chosen[0] < 0:
+            best, following = np.zeros(3), self.no_plan
+        else:
+            best, following = motions[chosen[0]], np.array([past + 1, *chosen])
         most = limits.acceleration * WINDOW
         told = now + np.clip(best - now, -most, most)
         if self._curved:
             told[2] = best[2] * told[0]
-        return Chosen(told, cost, float(best[0]))
+        return Chosen(told, cost, following)
 
 
 def _turning(limits: BaseLimits) -> Array:
