@@ -15,6 +15,9 @@ from anysim.record.header import NumberType
 from anysim.task.snapshot import EnvSnapshot
 from anysim.testing.families.fixtures import ENVS, NAME, STEPS, Make, family_of, run, same, seen
 
+LYING = 2e-8
+"""[N s] that may be lost of any matter: where it lies as it begins, weight and ground give it next to nothing in sum."""
+
 
 def test_parameters(run_spec: dict[str, Any]) -> None:
     """Its parameters are closed: a key that it does not know is told at its place."""
@@ -157,7 +160,7 @@ def test_balance(make: Make) -> None:
     lost = found.now - found.begun - found.received + found.given
     scale = max(np.abs(rows[:, :3]).max() for rows in (found.received, found.given))
     assert scale > 0, "nothing acts on its matter"
-    assert np.abs(lost[:, :3]).max() <= 1e-6 * scale, "momentum is lost; count all that it gets and gives"
+    assert np.abs(lost[:, :3]).max() <= 1e-6 * scale + LYING, "momentum is lost; count all that it gets and gives"
 
 
 def _bodies(env: Any, entity: int) -> range:
