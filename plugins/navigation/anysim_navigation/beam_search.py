@@ -19,7 +19,7 @@ COARSE, FREE, BESIDE = 2, 0.85, 3.0
 """Cells of a scan that are one of what is left to go; shares of its smallest disc that a base keeps there; and [m] that
 are added where there is no way."""
 WINDOW = 0.35
-"""[s] of acceleration by which what is told may differ from what is."""
+"""[s] by which what is told is ahead of what is: so much later the motions have that velocity."""
 
 
 class Weights(NamedTuple):
@@ -199,14 +199,13 @@ class BeamSearch:
             STEP,
             *self._size,
         )
-        if chosen[0] < 0:
-            best, following = np.zeros(3), self.no_plan
-        else:
-            best, following = motions[chosen[0]], np.array([past + 1, *chosen])
-        most = limits.acceleration * WINDOW
-        told = now + np.clip(best - now, -most, most)
+        told, left = now, WINDOW
+        for k, lasts in zip(chosen, ((self._size[0] - past) * STEP, WINDOW), strict=False):
+            most = limits.acceleration * min(lasts, left)
+            told, left = told + np.clip((motions[k] if k >= 0 else 0.0) - told, -most, most), left - min(lasts, left)
         if self._curved:
-            told[2] = best[2] * told[0]
+            told[2] = told[0] * (motions[chosen[0], 2] if chosen[0] >= 0 else 0.0)
+        following = np.array([past + 1, *chosen]) if chosen[0] >= 0 else self.no_plan
         return Chosen(told, cost, following)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anysim.conventions import Array
-from anysim_navigation.beam_search import USUAL, BeamSearch, Search, left_to_go
+from anysim_navigation.beam_search import USUAL, BeamSearch, Search, Weights, left_to_go
 from anysim_navigation.dynamic_window import STEP, DynamicWindow
 from anysim_navigation.kernels.window import distance_at
 from anysim_navigation.limits import BaseKind, BaseLimits, limits_of
@@ -182,6 +182,22 @@ def test_what_was_meant_is_not_given_up_because_it_is_not_found_again(kind: Base
     assert narrow.choose(*asked).cost > meant.cost + 0.02
     assert again.cost <= meant.cost + 1e-9
     assert again.plan[1] == meant.plan[1]
+
+
+def test_a_contact_weighs_less_the_later_it_would_be() -> None:
+    """Somebody runs through a base that cannot move, a second later or earlier; people may turn until then."""
+    walls = Scene(((-1.0, -1.0, 1.0, -0.28), (-1.0, 0.28, 1.0, 1.0), (0.28, -1.0, 1.0, 1.0), (-1.0, -1.0, -0.28, 1.0)))
+
+    def cost(doubt: float, distance: float) -> float:
+        search = BeamSearch(limits(BaseKind.ACKERMANN), Search(Weights(near=0.0, doubt=doubt)))
+        runner = np.array([[0.0, distance, 0.0, -1.5, 0.25]])
+        return search.choose(walls.field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD, np.zeros(3), runner).cost
+
+    free = cost(0.0, 20.0)
+    early, late = (np.array([cost(doubt, distance) - free for doubt in (0.0, 0.4)]) for distance in (1.2, 2.7))
+    assert early[0] > 1.0
+    assert late[0] == pytest.approx(early[0], rel=0.2)
+    assert late[1] / early[1] == pytest.approx(np.exp(-0.4), rel=0.2)
 
 
 def test_a_plan_goes_on_where_it_is() -> None:
