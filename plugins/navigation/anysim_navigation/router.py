@@ -222,13 +222,25 @@ class BaseRouter:
             made.recover()
 
     def _way(self, env: int, row: int, pose: Array) -> Array:
-        """(K, 2) around movers that stand, or where there is no way so, through where they are."""
+        """(K, 2) around movers that stand, or where there is no way so, through where they are.
+
+        A car that people drove off its way may stand where none of a car begins: it gets one over the mesh, along which
+        the search shunts it, until it is stale.
+        """
+        there = (self._movers.there(row, standing=standing) for standing in (True, False))
         try:
-            return self._way_past(env, self._movers.there(row, standing=True), pose)
+            return self._way_past(env, next(there), pose)
         except NoRoute:
             if not self._movers.names:
                 raise
-            return self._way_past(env, self._movers.there(row, standing=False), pose)
+        present = next(there)
+        try:
+            return self._way_past(env, present, pose)
+        except NoRoute:
+            if self.limits.kind is not BaseKind.ACKERMANN:
+                raise
+        self._gear[env], self._later[env] = 1.0, []
+        return self._over_mesh(env, self._maps[-1], present, pose)
 
     def _way_past(self, env: int, present: Array, pose: Array) -> Array:
         """(K, 2) over the mesh with the most room, or over the tightest that has a way."""
@@ -243,12 +255,13 @@ class BaseRouter:
             return first
         for maps in self._maps[:-1]:
             with suppress(NoRoute):
-                return self._joined(pose[:2], maps.at(poses, present).path(pose[:2], end, snap=SNAP), end)
-        return self._joined(pose[:2], self._maps[-1].at(poses, present).path(pose[:2], end, snap=SNAP), end)
+                return self._over_mesh(env, maps, present, pose)
+        return self._over_mesh(env, self._maps[-1], present, pose)
 
-    @staticmethod
-    def _joined(start: Array, path: Array, end: Array) -> Array:
-        """The way from where the base is to where it is to be, at least two points."""
+    def _over_mesh(self, env: int, maps: NavMaps, present: Array, pose: Array) -> Array:
+        """(K, 2) from where the base is to where it is to be, at least two points."""
+        start, end = pose[:2], self.target[env, :2]
+        path = maps.at(self._scene.state.body_pose[env], present).path(start, end, snap=SNAP)
         return np.concatenate([start[None], path[1:-1], end[None]])
 
     def _refuse(self, env: int, why: str) -> None:
