@@ -184,6 +184,26 @@ def test_what_was_meant_is_not_given_up_because_it_is_not_found_again(kind: Base
     assert again.plan[1] == meant.plan[1]
 
 
+def test_what_is_told_is_what_the_motions_come_to_a_little_later() -> None:
+    """Also where the first of them is nearly over, and the next one goes back: told is not what overshoots it."""
+    search, rng = BeamSearch(limits(BaseKind.ACKERMANN)), np.random.default_rng(1)
+    speeds, turned = [0.6, 0.3, 0.0, -0.3], 0  # of motions: five with each speed, one that stands
+    of_motion = [speed for speed in speeds for _ in range(5 if speed else 1)]
+    plan = search.no_plan
+    for _ in range(60):
+        movers = np.array([[*rng.uniform(-1.5, 1.5, 2), *rng.uniform(-0.5, 0.5, 2), 0.25]])
+        now = np.array([rng.uniform(-0.3, 0.6), 0.0, 0.0])
+        told, _, found = search.choose(Scene().field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD, now, movers, 1.0, plan)
+        speed, left = now[0], round((6 - found[0]) * STEP, 6)  # of the first motion, as it was chosen
+        for tick in range(35):
+            aim = of_motion[found[1] if tick * 0.01 < left - 1e-9 else found[2]]
+            speed += np.clip(aim - speed, -0.01 * search.limits.acceleration[0], 0.01 * search.limits.acceleration[0])
+        assert told[0] == pytest.approx(speed, abs=0.02)
+        turned += bool(left < 0.3 and of_motion[found[1]] != of_motion[found[2]])
+        plan = found
+    assert turned > 3
+
+
 def test_a_contact_weighs_less_the_later_it_would_be() -> None:
     """Somebody runs through a base that cannot move, a second later or earlier; people may turn until then."""
     walls = Scene(((-1.0, -1.0, 1.0, -0.28), (-1.0, 0.28, 1.0, 1.0), (0.28, -1.0, 1.0, 1.0), (-1.0, -1.0, -0.28, 1.0)))
