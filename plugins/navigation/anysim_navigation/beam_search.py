@@ -93,9 +93,9 @@ class Search(NamedTuple):
 
 USUAL: dict[BaseKind, Search] = {
     BaseKind.ACKERMANN: Search(
-        Weights(contact=40.0, closer=60.0, near=3.0, tight=0.1, late=0.15, back=0.05, doubt=0.4),
+        Weights(contact=40.0, closer=60.0, near=2.0, tight=0.1, late=0.15, back=0.05, doubt=0.4),
         Foresight(fine=4, depth=8),
-        Margins(close=0.2),
+        Margins(movers=0.9, close=0.2),
         keeps=True,
         wary=True,
     ),
@@ -105,9 +105,9 @@ USUAL: dict[BaseKind, Search] = {
         Margins(close=0.12, kept=0.0),
     ),
 }
-"""Of kinds that differ. A car needs longer to get out of a way, and gets nowhere when it shunts to and fro, as it does
-when each time another of two plans is found; who can go aside is out of it at once, and swings round no corner. Neither
-is to wait before what is narrow."""
+"""Of kinds that differ. A car needs longer to get out of a way, so that it keeps further from people, and gets nowhere
+when it shunts to and fro, as it does when each time another of two plans is found; who can go aside is out of it at
+once, and swings round no corner. Neither is to wait before what is narrow."""
 
 
 class Chosen(NamedTuple):
