@@ -21,9 +21,6 @@ PEOPLE = "avatar"
 CREEPS, LEAST_SHARE, FASTEST = 0.01, 0.1, 0.6
 """[m/s] above which the velocity of who turns has the direction that it will keep, the least share of their pace that
 they are taken to have meanwhile, and [m/s] the most that is foreseen of that."""
-STANDS_TO_TURN, TURNS_TO, PACE, SLIGHT = 0.2, np.radians((90.0, 135.0, 180.0)), 0.35, 0.1
-"""[rad/s] that who stands turns at, at least, to walk off; [rad] from where they look; [m/s]; and [m] by which discs of
-what may be are smaller."""
 ASIDE, STRIDE = 0.08, 0.33
 """[m] to their sides and [s] of their way before and behind them, people take more room than as they stand: measured of
 feet, at 0.2 to 0.5 m/s."""
@@ -64,17 +61,14 @@ class Movers:
     """Entities that move by themselves. Their velocity is that which they have, not one that they were told.
 
     But people who turn as they set out walk at the squared cosine of what they have yet to turn, of their pace: this is
-    what they are foreseen with. For who is `wary`, those who stand yet and turn walk off to where they turn to: in each
-    of three directions there is a smaller disc of them.
+    what they are foreseen with.
 
     Attributes:
         names: theirs.
         bodies: all of theirs.
     """
 
-    def __init__(
-        self, scene: SceneView, names: Sequence[str], top: float = inf, *, strides: bool = True, wary: bool = False
-    ) -> None:
+    def __init__(self, scene: SceneView, names: Sequence[str], top: float = inf, *, strides: bool = True) -> None:
         """What of them is higher than `top` [m] above the ground takes no room; without `strides` each is one disc."""
         world = scene.engine.world
         self._scene = scene
@@ -94,7 +88,6 @@ class Movers:
         pairs = each[people & strides]
         self._discs = np.concatenate([each, pairs])
         """(M,) the mover of each disc: people have one before them and one behind."""
-        self._wary = wary
         self._radius = radius[self._discs]
         self._stride = STRIDE * np.concatenate([people & strides, -np.ones(len(pairs))])
 
@@ -107,37 +100,21 @@ class Movers:
         return present
 
     def around(self, rows: Array, pose: Array) -> Array:
-        """(n, D, 5) x, y, vx, vy and radius of discs in frames x, y, yaw (n, 3); `rows` are those of the scene."""
+        """(n, M, 5) x, y, vx, vy and radius of discs in frames x, y, yaw (n, 3); `rows` are those of the scene."""
         if not len(self._roots):
             return np.zeros((len(rows), 0, 5))
         envs, state = self._scene.env_ids[rows], self._scene.state
-        poses, twist = state.body_pose[envs][:, self._roots], state.body_twist[envs][:, self._roots]
-        speed, yaw = twist[..., :2], P.yaw(poses[..., 3:])
+        poses, speed = state.body_pose[envs][:, self._roots], state.body_twist[envs][:, self._roots, :2]
         place = poses[..., :2] + self._offset - pose[:, None, :2]
         place[~self._scene.presence[envs][:, self._numbers]] += PARKED
-        speed = (speed * self._growth(speed, yaw))[:, self._discs]
+        speed = (speed * self._growth(speed, P.yaw(poses[..., 3:])))[:, self._discs]
         place = place[:, self._discs] + self._stride[:, None] * speed
         c, s = np.cos(pose[:, 2])[:, None], np.sin(pose[:, 2])[:, None]
         turned = [
             np.stack([c * v[..., 0] + s * v[..., 1], c * v[..., 1] - s * v[..., 0]], axis=-1) for v in (place, speed)
         ]
         radius = np.broadcast_to(self._radius, place.shape[:2])[..., None]
-        discs = np.concatenate([*turned, radius], axis=-1)
-        may_be = self._walking_off(discs[:, : len(self._roots)], twist, yaw - pose[:, 2:]) if self._wary else []
-        return np.concatenate([discs, *may_be], axis=1)
-
-    def _walking_off(self, discs: Array, twist: Array, yaw: Array) -> list[Array]:
-        """Discs (n, R, 5), for each direction, of movers with twists (n, R, 6) who look to `yaw` (n, R)."""
-        turning = np.abs(twist[..., 5]) > STANDS_TO_TURN
-        turning &= self._people & (np.hypot(twist[..., 0], twist[..., 1]) <= CREEPS)
-        each = []
-        for turn in TURNS_TO:
-            heading, disc = yaw + np.sign(twist[..., 5]) * turn, discs.copy()
-            disc[..., 2], disc[..., 3] = PACE * np.cos(heading), PACE * np.sin(heading)
-            disc[..., 4] -= SLIGHT
-            disc[~turning, 0] += PARKED
-            each.append(disc)
-        return each
+        return np.concatenate([*turned, radius], axis=-1)
 
     def _growth(self, speed: Array, yaw: Array) -> Array:
         """(n, R, 1) by how much velocities (n, R, 2) of who looks to `yaw` (n, R) are going to grow."""
