@@ -148,7 +148,7 @@ def plot(path: Path) -> None:
         axis.legend(frameon=False)
         print(name, *(f"{x:.3g}: {y:.3g} ({told[name](x):.3g})" for x, y in rows), sep="\n  ")
     run = found["dam"][(found["dam"][:, 1] > 0.5) & (found["dam"][:, 1] < 2.0)]
-    print(f"the front runs at {np.polyfit(*run.T, 1)[0]:.2f} sqrt(g depth)")
+    print(f"the front runs at {np.polyfit(run[:, 0], run[:, 1], 1)[0]:.2f} sqrt(g depth)")
     figure.savefig(path, dpi=80)
 
 

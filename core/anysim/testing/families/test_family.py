@@ -16,7 +16,7 @@ from anysim.task.snapshot import EnvSnapshot
 from anysim.testing.families.fixtures import ENVS, NAME, STEPS, Make, family_of, run, same, seen
 
 LYING = 2e-8
-"""[N s] that may be lost of any matter: where it lies as it begins, weight and ground give it next to nothing in sum."""
+"""[N s] that any matter may lose: where it lies as it begins, weight and ground give it next to nothing in sum."""
 
 
 def test_parameters(run_spec: dict[str, Any]) -> None:
