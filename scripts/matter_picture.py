@@ -12,6 +12,7 @@ import numpy as np
 from pictures import begun, side_by_side
 
 from anysim.conventions import Array
+from anysim_particles.bench import tank
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 STEPS = 25
@@ -20,8 +21,6 @@ GRAVITY, WATER = 9.81, 1000.0
 
 def world() -> dict[str, Any]:
     """A tank with a box that floats, a heap of sand and one of rice."""
-    from anysim_particles.bench import tank
-
     made = tank(0.12, 0.08, 0.01)
     made["objects"]["box"] = {"source": {"box": [0.04, 0.04, 0.04]}, "density": 400, "color": "red"}
     made["layout"]["box"] = {"position": [0.02, 0.0, 0.1]}
@@ -50,8 +49,6 @@ def waited(env: Any, steps: int) -> None:
 
 def dam(depth: float = 0.1, width: float = 0.06) -> Array:
     """(K, 2) times, in sqrt(depth / g), and how far the front of a column of so much water came, in depths."""
-    from anysim_particles.bench import tank
-
     made = tank(width, 0.2)
     for name, side in (("west", -1), ("east", 1)):
         made["layout"][name]["position"] = [0.46 * side, 0.0, 0.1]
@@ -69,8 +66,6 @@ def dam(depth: float = 0.1, width: float = 0.06) -> Array:
 
 def pressures(edge: float = 0.08) -> Array:
     """(K, 2) depths [m] of water in a tank, and the mean pressure [Pa] on its floor."""
-    from anysim_particles.bench import tank
-
     rows = []
     for depth in (0.03, 0.06, 0.09, 0.12):
         with alone({"kind": "fluid", "box": [edge, edge, depth]}, tank(edge, 2 * depth)) as (env, it):
@@ -84,8 +79,6 @@ def pressures(edge: float = 0.08) -> Array:
 
 def drafts(edge: float = 0.08, spacing: float = 0.0125) -> Array:
     """(K, 2) densities [kg/m^3] of a cube, and how much of it [m] is under water."""
-    from anysim_particles.bench import tank
-
     rows = []
     for density in (200.0, 400.0, 600.0, 800.0):
         made = tank(0.15, 0.3)

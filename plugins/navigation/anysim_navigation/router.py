@@ -225,13 +225,12 @@ class BaseRouter:
         A car that people drove off its way may stand where none of a car begins: it gets one over the mesh, along which
         the search shunts it, until it is stale.
         """
-        there = (self._movers.there(row, standing=standing) for standing in (True, False))
         try:
-            return self._way_past(env, next(there), pose)
+            return self._way_past(env, self._movers.there(row, standing=True), pose)
         except NoRoute:
             if not self._movers.names:
                 raise
-        present = next(there)
+        present = self._movers.there(row, standing=False)
         try:
             return self._way_past(env, present, pose)
         except NoRoute:

@@ -151,9 +151,7 @@ def hasten(b: Proxies, k: int, x: float, y: float, z: float, j0: float, j1: floa
 
 @compiled
 def yields(b: Proxies, k: int, x: float, y: float, z: float, n0: float, n1: float, n2: float) -> float:
-    """How much faster [m/s] a point of body k gets along a unit vector, for an impulse of 1 N s along it."""
-    if not b.light[k] > 0.0:
-        return 0.0
+    """How much faster [m/s] a point of a body that yields gets along a unit vector, for 1 N s along it."""
     u, v, w = x - b.com[k, 0], y - b.com[k, 1], z - b.com[k, 2]
     t0, t1, t2 = v * n2 - w * n1, w * n0 - u * n2, u * n1 - v * n0
     t = b.turns
