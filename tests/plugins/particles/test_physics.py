@@ -32,6 +32,22 @@ def test_a_fluid_has_its_level_and_presses_on_the_floor_with_its_weight():
         assert mass == pytest.approx(edge * edge * depth * 1000, rel=1e-9)
 
 
+@pytest.mark.parametrize("drag", [0.0, 0.02])
+def test_a_drop_slides_on_or_is_held_by_the_drag_of_what_it_lies_on(drag):
+    """In each substep its share of the velocity goes, and the ground gets it; without drag it slides for ever."""
+    matter = {**column(0.01, 0.01, 0.01), "drag": drag}
+    with begun(run_of(matter, world={"terrain": "plane"})) as (env, it):
+        wait(env, 5)
+        before = it.received.copy()
+        it.v[0, :, 0] = 0.5
+        wait(env, 10)
+        speed, substeps = it.v[0, 0, 0], 10 * 5 * 2
+        assert it.v.shape[1] == 1
+        assert speed == pytest.approx(0.5 * (1.0 - drag) ** substeps, rel=1e-6)
+        given = (it.received - before)[0, 0]
+        assert given == pytest.approx(float(it.particle_mass(ALL)[0]) * (speed - 0.5), rel=1e-6, abs=1e-9)
+
+
 @pytest.mark.slow
 def test_a_dam_that_breaks_runs_as_fast_as_shallow_water():
     """The front of a column of depth a, from 1.5 a to 3 a, runs at 0.6 to 1.05 of 2 sqrt(g a).
