@@ -10,14 +10,12 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math.compiled import compiled as in_numba
-from anysim_sensors.kernels.first_use import tell_of_compiling
 from anysim_sensors.tables import BOX, CAPSULE, CYLINDER, PLANE, SPHERE, GeomPoses, Geoms
 
 compiled = partial(in_numba, nogil=True)
 """The decorator of all kernels."""
 guarded = partial(in_numba, nogil=True, error_model="numpy")
 """And of those that never divide by zero, which need not look whether they do: loops of them take several at once."""
-tell_of_compiling()
 
 BINS = 16
 DEEPEST = 60
