@@ -18,7 +18,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capability
-from anysim.errors import PluginError, listing
+from anysim.errors import PluginError, SpecError, SpecIssue, listing, suggest
 from anysim.math import pose as P
 from anysim.model.appearance import Rgb, rgb
 from anysim.randomization.streams import Streams
@@ -63,6 +63,30 @@ class FamilySetting(NamedTuple):
     streams: Streams
     entities: tuple[int, ...]
     origin: Array
+
+    def fault(self, key: str, words: str) -> SpecError:
+        """What to raise where a key of the spec, `at` or `pads.left`, is at fault: the message points to its line."""
+        return SpecError([SpecIssue("", f"world.families.{self.name}.{key}", words)])
+
+
+def body_of(setting: FamilySetting, name: str, key: str | None = None) -> int:
+    """The index of a body of the World, `ann.head`, or of the root of an object.
+
+    Raises:
+        SpecError: there is neither; it points to the key of the family's spec that names it.
+        PluginError: likewise, where no key is given.
+    """
+    world = setting.engine.world
+    if name in world.entity_numbers:
+        return int(world.entities[world.entity_numbers[name]].root)
+    names = [body.name for body in world.bodies]
+    if name in names:
+        return names.index(name)
+    near = suggest(name, [*world.entity_numbers, *names])
+    words = f"there is no body or object '{name}'{near} (objects: {listing([*world.entity_numbers])})"
+    if key is None:
+        raise PluginError(words)
+    raise setting.fault(key, words)
 
 
 class Family(ABC):
@@ -157,12 +181,9 @@ class Family(ABC):
 
     # ------------------------------------------------------------------ exchange with the engine
 
-    def body(self, name: str) -> int:
-        """The index of a body of the World, `ann.head`; PluginError where there is none."""
-        names = [body.name for body in self.engine.world.bodies]
-        if name not in names:
-            raise PluginError(f"the World of the family '{self.setting.name}' has no body '{name}' ({listing(names)})")
-        return names.index(name)
+    def body(self, name: str, key: str | None = None) -> int:
+        """The index of a body of the World, `ann.head`, or of the root of an object, as `body_of` finds it."""
+        return body_of(self.setting, name, key)
 
     def drives(self, bodies: Iterable[int]) -> None:
         """Say, when it is made, which bodies `place` and `drive` are about, K of them; it has to be said once."""

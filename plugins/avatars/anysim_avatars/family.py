@@ -117,11 +117,10 @@ class Avatars(Family):
         return f"world.families.{self.setting.name}.{f'each.{number}.' if own else ''}{key}"
 
     def _read(self, clip: str, file: str) -> Motion:
-        path = f"world.families.{self.setting.name}.motions.{clip}"
         try:
             return read_motion(locate(file).path)
         except AnysimError as error:
-            raise SpecError([SpecIssue("", path, str(error))]) from error
+            raise self.setting.fault(f"motions.{clip}", str(error)) from error
 
     def _rows(self, script: Sequence[ActionSpec], path: str) -> Array:
         issues: list[SpecIssue] = []

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.engine.capability import Capability
-from anysim.errors import SpecError, SpecIssue, listing, suggest
+from anysim.errors import listing, suggest
 from anysim.families.base import Family, FamilyPart, FamilySetting, FamilyState
 from anysim.kinematics import inertia
 from anysim.math import matrix as M, pose as P
@@ -82,8 +82,7 @@ class Hold(Family):
             return names.index(body)
         roots = [one.name for one in self.engine.world.entities]
         words = f"there is no {'avatar' if key == 'avatar' else 'object'} '{said}'"
-        where = f"world.families.{self.setting.name}.{key}"
-        raise SpecError([SpecIssue("", where, f"{words}{suggest(said, roots)} (there are: {listing(roots)})")])
+        raise self.setting.fault(key, f"{words}{suggest(said, roots)} (there are: {listing(roots)})")
 
     # ------------------------------------------------------------------ its life
 

@@ -7,12 +7,12 @@ import numpy as np
 from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
-from anysim.families.base import FamilyPart, FamilySetting, FamilyState
+from anysim.families.base import FamilyPart, FamilySetting, FamilyState, body_of
 from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
 from anysim.model.appearance import rgb
 from anysim.model.world import Body, BodyKind
-from anysim_fields.bodies import body_of, drawn, must_collide
+from anysim_fields.bodies import drawn, must_collide
 from anysim_fields.puffs import Puffs
 from anysim_fields.spec import FlowSpec
 from anysim_schemas.base import Spec

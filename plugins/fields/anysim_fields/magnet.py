@@ -6,11 +6,11 @@ import numpy as np
 
 from anysim.assets.model import ImportedModel
 from anysim.conventions import WORLD, Array
-from anysim.families.base import FamilyPart, FamilySetting, FamilyState
+from anysim.families.base import FamilyPart, FamilySetting, FamilyState, body_of
 from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
 from anysim.model.world import Body, BodyKind
-from anysim_fields.bodies import body_of, drawn, must_collide
+from anysim_fields.bodies import drawn, must_collide
 from anysim_fields.spec import MagnetSpec
 from anysim_schemas.base import Spec
 
@@ -39,7 +39,10 @@ class Magnet(CoSolver):
         self.magnets, self.names = setting.spec, [*setting.spec.dipoles]
         world = setting.engine.world
         self._body = np.array(
-            [body_of(setting, one.body, f"dipoles.{name}.body") for name, one in setting.spec.dipoles.items()],
+            [
+                WORLD if one.body is None else body_of(setting, one.body, f"dipoles.{name}.body")
+                for name, one in setting.spec.dipoles.items()
+            ],
             dtype=np.intp,
         )
         super().__init__(setting)

@@ -8,7 +8,6 @@ from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
 from anysim.families.base import Family, FamilyState
 from anysim.math import pose as P
-from anysim_fields.bodies import body_of
 from anysim_fields.spec import SourceSpec
 
 ONE_PUFF = 1_000_000_000
@@ -34,7 +33,7 @@ class Puffs:
         self._next = remember("next", 1, dtype=np.int64, bounds=(0, count - 1))
         self._due = remember("due", 1, dtype=np.int64, bounds=(0, ONE_PUFF))
         self._luck = remember("luck", 2, dtype=np.int64)
-        self._at = body_of(family.setting, spec.at, "at")
+        self._at = WORLD if spec.at is None else family.body(spec.at, "at")
 
     @property
     def id(self) -> int:

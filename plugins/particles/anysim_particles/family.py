@@ -83,10 +83,7 @@ class Particles(CoSolver):
         self.count = self.remember("count", dtype=np.int64, bounds=(0, size))
         self.density = self.remember("density")
         self.scene = SceneGeometry(world)
-        entity = world.entity_numbers.get(setting.spec.at or "")
-        self._at = None
-        if setting.spec.at is not None:
-            self._at = self.body(setting.spec.at) if entity is None else world.entities[entity].root
+        self._at = None if setting.spec.at is None else self.body(setting.spec.at, "at")
         slots = np.full(len(world.bodies) + 1, len(self.met), dtype=np.int32)
         slots[self.met] = np.arange(len(self.met))
         self._slot = slots[self.scene.geoms.body]

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from anysim.conventions import Array, wxyz_from_xyzw
-from anysim.errors import SpecError, SpecIssue
 from anysim.families.base import FamilySetting
 from anysim.math import pose as P
 from anysim_soft.flex_xml import contact_of, numbers
@@ -53,8 +52,7 @@ class Deformable(ShellMatter):
         for side in spec.fixed:
             fixed |= on_side(nodes, box, side)
         if fixed.all():
-            path = f"world.families.{self.setting.name}.fixed"
-            raise SpecError([SpecIssue("", path, "nothing of it can move; fix fewer sides")])
+            raise self.setting.fault("fixed", "nothing of it can move; fix fewer sides")
         words = {
             "count": " ".join(map(str, spec.points)),
             "spacing": numbers(box / (counts - 1)),

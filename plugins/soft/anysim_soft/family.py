@@ -9,7 +9,7 @@ import numpy as np
 from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
-from anysim.errors import PluginError, SpecError, SpecIssue, listing
+from anysim.errors import SpecError, SpecIssue, listing
 from anysim.families.base import Family, FamilyPart, FamilySetting, FamilyState
 from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
@@ -97,7 +97,7 @@ class Soft(CoSolver):
         self.scenery = Scenery.of(world, self.met)
         entity = np.array(world.body_entity, dtype=np.intp)
         self._entities = entity[np.concatenate([self.met, self.scenery.still])]
-        self._at = None if setting.spec.at is None else self._root(setting.spec.at)
+        self._at = None if setting.spec.at is None else self.body(setting.spec.at, "at")
         self._heavier = np.ones(k)
         for name, factor in setting.spec.held.items():
             self._heavier[self._met(name, "held", loose=True)] = factor
@@ -146,22 +146,14 @@ class Soft(CoSolver):
         rows = zip(self._nodes.tolist(), self._holders.tolist(), anchors, strict=True)
         return [Joint(node, place, anchor.copy()) for node, place, anchor in rows]
 
-    def _root(self, name: str) -> int:
-        """The body that is called so, or the root of the object."""
-        world = self.engine.world
-        entity = world.entity_numbers.get(name)
-        return self.body(name) if entity is None else world.entities[entity].root
-
     def _met(self, name: str, key: str, *, loose: bool) -> int:
         """The place in `met` of a body, or of an object's root."""
-        body, bodies = self._root(name), self.engine.world.bodies
+        body, bodies = self.body(name, key), self.engine.world.bodies
         places = {int(i): place for place, i in enumerate(self.met) if not (loose and self._held[place])}
         if body not in places:
             kind = "free body" if loose else "body that moves and"
             known = listing([bodies[i].name for i in places])
-            raise PluginError(
-                f"world.families.{self.setting.name}.{key}: '{name}' is no {kind} that collides (there are: {known})"
-            )
+            raise self.setting.fault(key, f"'{name}' is no {kind} that collides (there are: {known})")
         return places[body]
 
     def drawn_value(self, key: str, env_ids: Array) -> Array:

@@ -74,9 +74,10 @@ class Garment(Soft):
         super().__init__(setting)
         if self.pads.pinch and self._step > STEP * (1 + 1e-9):
             least = int(np.ceil(setting.engine.world.physics.dt / STEP - 1e-9))
-            raise PluginError(
-                f"world.families.{setting.name}.substeps: a pinch takes steps of {STEP:g} s at most, these are of "
-                f"{self._step:g} s; give `substeps: {least}` or more"
+            raise setting.fault(
+                "substeps",
+                f"a pinch takes steps of {STEP:g} s at most, these are of {self._step:g} s; give `substeps: {least}` "
+                "or more",
             )
 
     @classmethod

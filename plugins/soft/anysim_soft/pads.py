@@ -48,12 +48,11 @@ class Pads:
         engine, self._world = setting.engine, setting.engine.world
         self._frames, self._joints = [], np.zeros(len(self.specs), dtype=np.intp)
         for number, (name, spec) in enumerate(specs.items()):
-            path = f"world.families.{setting.name}.pads.{name}"
             try:
                 self._frames.append(engine.index.frame(spec.tool))
                 self._joints[number] = engine.index.joint(spec.joint)
             except AnysimError as error:
-                raise PluginError(f"{path}: {error}") from None
+                raise setting.fault(f"pads.{name}", str(error)) from None
         self._path = f"world.families.{setting.name}.pads"
         self._jaws: list[Jaw] = []
         self._closed = np.array([spec.closed for spec in self.specs])

@@ -128,7 +128,7 @@ def test_what_is_asked_for_later_is_done_in_those_envs():
     ("do", "words"),
     [
         ([{"clip": "dance"}], r"world\.families\.ann\.do\.0: there is no clip 'dance'"),
-        ([{"clip": "idle", "gaze": "bal"}], r"do\.0: .*no body 'bal'"),
+        ([{"clip": "idle", "gaze": "bal"}], r"do\.0: .*no body or object 'bal'"),
         ([{"go_to": [1, 2], "turn_to": 1.0}], r"do\.0\.turn_to.*one thing at a time"),
         ([{"path": []}], r"do\.0\.path.*1 to 16 points"),
         ([{"walk_to": [1, 2]}], r"do\.0\.walk_to: unknown key"),

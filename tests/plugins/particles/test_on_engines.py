@@ -125,7 +125,7 @@ def test_matter_begins_in_a_container_wherever_that_is():
         ({"box": None}, r"families\.it.*needs a block"),
         ({"spacing": 0.001}, r"families\.it\.box: the block holds 100,000 particles; 1 to 50,000"),
         ({"density": -1.0}, r"families\.it\.density"),
-        ({"at": "cup"}, r"families\.it.*has no body 'cup'"),
+        ({"at": "cup"}, r"families\.it\.at: there is no body or object 'cup'"),
     ],
 )
 def test_what_cannot_be_is_refused(change, words):

@@ -158,8 +158,8 @@ def test_parameters_differ_by_env_and_are_the_same_by_seed():
         ({"cells": [40, 40, 1]}, r"families\.it\.cells.*nodes"),
         ({"fixed": ["-x", "+x", "-y", "+y", "-z", "+z"], "cells": [1, 1, 1]}, None),
         ({"held": {"ball": 5.0}}, r"families\.it\.held\.ball"),
-        ({"held": {"cup": 2.0}}, r"has no body 'cup'"),
-        ({"at": "cup"}, r"has no body 'cup'"),
+        ({"held": {"cup": 2.0}}, r"there is no body or object 'cup'"),
+        ({"at": "cup"}, r"there is no body or object 'cup'"),
     ],
 )
 def test_what_cannot_be_is_refused(change, words):

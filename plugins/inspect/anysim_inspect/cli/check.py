@@ -128,7 +128,7 @@ def _report_on(
     try:
         loaded = load(Path(name) if exists(name) else name, overrides=overrides, past=past)
         world = compile_world(loaded)
-        if loaded.spec.task is not None or loaded.spec.world.sensors:
+        if loaded.spec.task is not None or loaded.spec.world.sensors or loaded.spec.world.families:
             dry_run(watched(loaded), world)
             _check_film(loaded)
         found = [doubt[:2] for doubt in doubts(world)]
