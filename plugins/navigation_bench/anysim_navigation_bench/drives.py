@@ -23,7 +23,7 @@ HARD = 20.0
 """[N] a contact with something in the room that is harder is a failure."""
 HIT = {"term": "force_over", "limit": HARD, "steps": 1}
 LATE = 90.0
-"""[s]"""
+"""[s] that a drive may take."""
 CONTROL_DT = 0.02
 MOVES = 0.05
 """[m/s] what is slower stands."""
@@ -47,6 +47,7 @@ class Driving(NamedTuple):
         close, facing: [m], and 1 less the cosine of the angle; None where the heading is free.
         still: [m/s], [rad/s] that it may have in the end.
         tilts: whether it can fall.
+        late: [s] that a drive among people may take.
     """
 
     radius: float = 0.45
@@ -56,6 +57,7 @@ class Driving(NamedTuple):
     facing: float | None = 0.1
     still: tuple[float, float] = (0.05, 0.1)
     tilts: bool = False
+    late: float = LATE
 
 
 _ON_LEGS: dict[str, Any] = {"close": 0.25, "facing": 0.3, "still": (0.15, 0.6), "tilts": True}
@@ -68,6 +70,7 @@ BASES: dict[str, Driving] = {
         {"heading": False, "tolerance": 0.1, "angle": 3.2},
         close=0.25,
         facing=None,
+        late=2 * LATE,  # who cannot turn on the spot lets people pass where there is room, and comes back
     ),
     "unitree_go1": Driving(skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.5, "rate": 0.8}, **_ON_LEGS),
     "unitree_g1": Driving(
@@ -115,7 +118,8 @@ def drive(
         return None
     start, goal, length = found
     yaws = np.random.default_rng([seed, 1]).uniform(-np.pi, np.pi, 2)
-    task = _task(seed, world, robot, how, start, goal, yaws, planner)
+    steps = int((how.late if people else LATE) / CONTROL_DT)
+    task = _task(seed, world, robot, how, start, goal, yaws, planner, steps)
     if people:
         walks = NavMaps(world, Agent(0.3, 1.9), area=box).at()
         task["world"]["families"] = {"person": _people(people, walks, start, np.random.default_rng([seed, 2]))}
@@ -164,7 +168,7 @@ def _people(count: int, mesh: NavMesh, start: Array, rng: np.random.Generator) -
 
 
 def _task(
-    seed: int, world: World, robot: str, how: Driving, start: Array, goal: Array, yaws: Array, planner: str
+    seed: int, world: World, robot: str, how: Driving, start: Array, goal: Array, yaws: Array, planner: str, steps: int
 ) -> dict[str, Any]:
     names = ["room", *(e.name for e in world.entities if e.name != "room")]
     x, y = (round(float(v), 3) for v in start)
@@ -174,7 +178,7 @@ def _task(
         facing = {"facing": {"term": "aligned", "a": "base", "b": "goal", "tolerance": how.facing}}
     upright = {"upright": {"frame": "base", "tolerance": 0.6}}
     fell = {"fell": {"term": "not", "of": upright}} if how.tilts else {}
-    skill = {"skill": "navigate", "robot": "base", "goal": "goal", "planner": planner, "steps": int(LATE / CONTROL_DT)}
+    skill = {"skill": "navigate", "robot": "base", "goal": "goal", "planner": planner, "steps": steps}
     return {
         "physics": {"dt": 0.002, "control_dt": CONTROL_DT},
         "world": {
@@ -192,7 +196,7 @@ def _task(
         },
         "task": {
             "description": "Drive to the goal in the room and stand as it points.",
-            "horizon": int(LATE / CONTROL_DT),
+            "horizon": steps,
             "command": {"goal": {"term": "goal_pose", "position": [*place, 0.08], "yaw": float(yaws[1])}},
             "observations": {"policy": [{"term": "relative_pose", "a": "base", "b": "goal"}]},
             "success": {
