@@ -74,7 +74,7 @@ def navigate(
 ) -> None:
     """Drive bases from end to end of furnished rooms in an engine, over 4 m each, with `planner: dynamic_window`.
 
-    A way fails that takes 90 s (a car among people 180 s), or on which something in the room or a person is touched
+    A way fails that takes 90 s (among people 180 s), or on which something in the room or a person is touched
     with more than 20 N.
 
     Examples:

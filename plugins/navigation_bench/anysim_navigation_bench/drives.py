@@ -22,8 +22,8 @@ FURTHER = 4.0
 HARD = 20.0
 """[N] a contact with something in the room that is harder is a failure."""
 HIT = {"term": "force_over", "limit": HARD, "steps": 1}
-LATE = 90.0
-"""[s] that a drive may take."""
+LATE, LATE_AMONG = 90.0, 180.0
+"""[s] that a drive may take, and one among people, who may stay in the way."""
 CONTROL_DT = 0.02
 MOVES = 0.05
 """[m/s] what is slower stands."""
@@ -47,7 +47,6 @@ class Driving(NamedTuple):
         close, facing: [m], and 1 less the cosine of the angle; None where the heading is free.
         still: [m/s], [rad/s] that it may have in the end.
         tilts: whether it can fall.
-        late: [s] that a drive among people may take.
     """
 
     radius: float = 0.45
@@ -57,7 +56,6 @@ class Driving(NamedTuple):
     facing: float | None = 0.1
     still: tuple[float, float] = (0.05, 0.1)
     tilts: bool = False
-    late: float = LATE
 
 
 _ON_LEGS: dict[str, Any] = {"close": 0.25, "facing": 0.3, "still": (0.15, 0.6), "tilts": True}
@@ -70,7 +68,6 @@ BASES: dict[str, Driving] = {
         {"heading": False, "tolerance": 0.1, "angle": 3.2},
         close=0.25,
         facing=None,
-        late=2 * LATE,  # who cannot turn on the spot lets people pass where there is room, and comes back
     ),
     "unitree_go1": Driving(skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.5, "rate": 0.8}, **_ON_LEGS),
     "unitree_g1": Driving(
@@ -118,7 +115,7 @@ def drive(
         return None
     start, goal, length = found
     yaws = np.random.default_rng([seed, 1]).uniform(-np.pi, np.pi, 2)
-    steps = int((how.late if people else LATE) / CONTROL_DT)
+    steps = int((LATE_AMONG if people else LATE) / CONTROL_DT)
     task = _task(seed, world, robot, how, start, goal, yaws, planner, steps)
     if people:
         walks = NavMaps(world, Agent(0.3, 1.9), area=box).at()
