@@ -18,6 +18,8 @@ WAYS, PACES = 12, (1.0, 0.5)
 COARSE, FREE, BESIDE = 2, 0.85, 3.0
 """Cells of a scan that are one of what is left to go; shares of its smallest disc that a base keeps there; and [m] that
 are added where there is no way."""
+PATIENT = (20.0, 50.0)
+"""[s] without getting nearer to its end, after which a base begins to keep less from people, and keeps least."""
 WINDOW = 0.35
 """[s] by which what is told is ahead of what is: so much later the motions have that velocity."""
 
@@ -63,12 +65,14 @@ class Margins(NamedTuple):
 
     Attributes:
         movers: to them, below which it costs to be near.
+        patient: so much more than that for who has not waited for long.
         close: to movers, within which it costs to come closer.
         things: to them, below which it costs to be near.
         kept: to things at least, by which what is told and what is done may differ.
     """
 
     movers: float = 0.4
+    patient: float = 0.0
     close: float = 0.0
     things: float = 0.08
     kept: float = 0.02
@@ -91,7 +95,7 @@ USUAL: dict[BaseKind, Search] = {
     BaseKind.ACKERMANN: Search(
         Weights(contact=12.0, closer=60.0, near=2.0, tight=0.1, late=0.15, back=0.05),
         Foresight(fine=4, depth=8),
-        Margins(movers=0.9, close=0.2),
+        Margins(patient=0.5, close=0.2, kept=0.04),
         keeps=True,
     ),
     BaseKind.HOLONOMIC: Search(
@@ -100,9 +104,10 @@ USUAL: dict[BaseKind, Search] = {
         Margins(close=0.12, kept=0.0),
     ),
 }
-"""Of kinds that differ. A car needs longer to get out of a way, so that it keeps further from people, and gets nowhere
-when it shunts to and fro, as it does when each time another of two plans is found; who can go aside is out of it at
-once, and swings round no corner. Neither is to wait before what is narrow."""
+"""Of kinds that differ. A car needs longer to get out of a way, so that it keeps further from people at first, and from
+things, which it does not follow its motions exactly beside; and it gets nowhere when it shunts to and fro, as it does
+when each time another of two plans is found. Who can go aside is out of a way at once, and swings round no corner.
+Neither is to wait before what is narrow."""
 
 
 class Chosen(NamedTuple):
@@ -148,11 +153,12 @@ class BeamSearch:
         movers: Array,
         gear: float = 0.0,
         plan: Array | None = None,
+        waited: float = 0.0,
     ) -> Chosen:
         """What is best now.
 
         The arguments are those of `DynamicWindow.choose`; `gear` is -1 where the way is to be gone backwards, `plan`
-        what was chosen a step ago.
+        what was chosen a step ago, `waited` [s] for how long it has got no nearer to its end.
         """
         from anysim_navigation.kernels import beam
 
@@ -166,6 +172,8 @@ class BeamSearch:
             now[1] = 0.0
         if self._curved:  # it goes further round than straight to a point ahead
             togo = left_to_go(field, cell, path, FREE * float(limits.discs[:, 2].min()))
+        margins = self._margins.copy()
+        margins[beam.PATIENT] *= np.interp(waited, PATIENT, (1.0, 0.0))
         past, *meant = self.no_plan if plan is None else plan
         last = float(self._motions[meant[0], 0]) if meant[0] >= 0 else 0.0
         if not self._keeps:
@@ -189,7 +197,7 @@ class BeamSearch:
             np.array(meant),
             int(past),
             self._weights,
-            self._margins,
+            margins,
             STEP,
             *self._size,
         )
