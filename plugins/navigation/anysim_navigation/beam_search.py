@@ -18,8 +18,6 @@ WAYS, PACES = 12, (1.0, 0.5)
 COARSE, FREE, BESIDE = 2, 0.85, 3.0
 """Cells of a scan that are one of what is left to go; shares of its smallest disc that a base keeps there; and [m] that
 are added where there is no way."""
-PATIENT = (20.0, 50.0)
-"""[s] without getting nearer to its end, after which a base begins to keep less from people, and keeps least."""
 WINDOW = 0.35
 """[s] by which what is told is ahead of what is: so much later the motions have that velocity."""
 
@@ -65,14 +63,12 @@ class Margins(NamedTuple):
 
     Attributes:
         movers: to them, below which it costs to be near.
-        patient: so much more than that for who has not waited for long.
         close: to movers, within which it costs to come closer.
         things: to them, below which it costs to be near.
         kept: to things at least, by which what is told and what is done may differ.
     """
 
     movers: float = 0.4
-    patient: float = 0.0
     close: float = 0.0
     things: float = 0.08
     kept: float = 0.02
@@ -93,9 +89,9 @@ class Search(NamedTuple):
 
 USUAL: dict[BaseKind, Search] = {
     BaseKind.ACKERMANN: Search(
-        Weights(contact=12.0, closer=60.0, near=2.0, tight=0.1, late=0.15, back=0.05),
+        Weights(contact=12.0, closer=60.0, near=2.0, tight=1.5, late=0.15, back=0.05),
         Foresight(fine=4, depth=8),
-        Margins(patient=0.5, close=0.2, kept=0.04),
+        Margins(movers=0.9, close=0.2, things=0.05),
         keeps=True,
     ),
     BaseKind.HOLONOMIC: Search(
@@ -104,10 +100,9 @@ USUAL: dict[BaseKind, Search] = {
         Margins(close=0.12, kept=0.0),
     ),
 }
-"""Of kinds that differ. A car needs longer to get out of a way, so that it keeps further from people at first, and from
-things, which it does not follow its motions exactly beside; and it gets nowhere when it shunts to and fro, as it does
-when each time another of two plans is found. Who can go aside is out of a way at once, and swings round no corner.
-Neither is to wait before what is narrow."""
+"""Of kinds that differ. A car needs longer to get out of a way, so that it keeps further from people, and gets nowhere
+when it shunts to and fro, as it does when each time another of two plans is found; who can go aside is out of it at
+once, and swings round no corner. Neither is to wait before what is narrow."""
 
 
 class Chosen(NamedTuple):
@@ -153,12 +148,11 @@ class BeamSearch:
         movers: Array,
         gear: float = 0.0,
         plan: Array | None = None,
-        waited: float = 0.0,
     ) -> Chosen:
         """What is best now.
 
         The arguments are those of `DynamicWindow.choose`; `gear` is -1 where the way is to be gone backwards, `plan`
-        what was chosen a step ago, `waited` [s] for how long it has got no nearer to its end.
+        what was chosen a step ago.
         """
         from anysim_navigation.kernels import beam
 
@@ -172,8 +166,6 @@ class BeamSearch:
             now[1] = 0.0
         if self._curved:  # it goes further round than straight to a point ahead
             togo = left_to_go(field, cell, path, FREE * float(limits.discs[:, 2].min()))
-        margins = self._margins.copy()
-        margins[beam.PATIENT] *= np.interp(waited, PATIENT, (1.0, 0.0))
         past, *meant = self.no_plan if plan is None else plan
         last = float(self._motions[meant[0], 0]) if meant[0] >= 0 else 0.0
         if not self._keeps:
@@ -197,7 +189,7 @@ class BeamSearch:
             np.array(meant),
             int(past),
             self._weights,
-            margins,
+            self._margins,
             STEP,
             *self._size,
         )

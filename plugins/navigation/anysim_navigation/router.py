@@ -112,8 +112,6 @@ class BaseRouter:
         self._steps, self._replans = np.zeros((2, n), dtype=np.int64)
         self._least = np.full(n, np.inf)
         """(N,) [m] the least that was left of any way."""
-        self._waited = np.zeros(n)
-        """(N,) [s] since it became so little."""
         self._progress: list[Progress | None] = [None] * n
         self._gear = np.zeros(n)
         """Of a car on its way: 1 forwards, -1 backwards."""
@@ -127,7 +125,7 @@ class BaseRouter:
     def go(self, ids: Array, target: Array, mode: Mode = Mode.ROUTE) -> None:
         """Go to x, y, yaw (n, 3) in these envs."""
         self.target[ids], self.mode[ids], self._steps[ids], self._replans[ids] = target, mode, 0, 0
-        self._least[ids], self._waited[ids] = np.inf, 0.0
+        self._least[ids] = np.inf
         if mode is Mode.STAND:  # an episode begins so: it does not go on from what the last one ended with
             self.twist[ids], self._plan[ids] = 0.0, self._no_plan
         for env in ids.tolist():
@@ -202,10 +200,9 @@ class BaseRouter:
         progress = self._progress[env]
         if progress is not None:
             progress.look(pose[:2], STEP)
-            self._waited[env] += STEP
             left = progress.left + sum(length_of(path) for path, _ in self._later[env])
             if left < self._least[env] - NEARER and progress.off < 0.3:
-                self._replans[env], self._least[env], self._waited[env] = 0, left, 0.0
+                self._replans[env], self._least[env] = 0, left
             if not progress.stale or progress.recovering > 0:
                 return
         if self._replans[env] > (REPLANS if self._movers.names else REPLANS // 4):
@@ -292,7 +289,7 @@ class BaseRouter:
         path, aim = self.window.ahead(progress, pose, field, cell, search.reach if search else None)
         gear = float(self._gear[env])
         if search:
-            found = search.choose(field, cell, path, aim, now, close, gear, self._plan[env], self._waited[env])
+            found = search.choose(field, cell, path, aim, now, close, gear, self._plan[env])
             self.twist[env], self._plan[env] = found.twist, found.plan
             return
         self._plan[env] = self._no_plan
@@ -314,7 +311,7 @@ class BaseRouter:
         return all(clearances(field, self._grid.cell, discs, nobody, x, y, 0.0, 0.0)[0] > -0.02 for x, y in points)
 
 
-_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear", "_plan", "_waited")
+_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear", "_plan")
 
 
 def pose_of(pose: Array) -> Array:

@@ -214,16 +214,6 @@ def test_a_plan_goes_on_where_it_is() -> None:
         plan = found.plan
 
 
-def test_a_car_that_has_waited_keeps_less_from_people() -> None:
-    """Somebody stands beside its way; who goes aside keeps as little from the beginning."""
-    beside = np.array([[1.0, 0.85, 0.0, 0.0, 0.25]])
-    asked = Scene().field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD, np.zeros(3), beside
-    car, other = BeamSearch(limits(BaseKind.ACKERMANN)), BeamSearch(limits(BaseKind.HOLONOMIC))
-    costs = [car.choose(*asked, waited=waited).cost for waited in (0.0, 20.0, 35.0, 50.0, 90.0)]
-    assert costs[0] == costs[1] > costs[2] > costs[3] == costs[4]
-    assert other.choose(*asked).cost == other.choose(*asked, waited=90.0).cost
-
-
 def test_what_is_left_to_go_leads_around_walls_to_where_the_way_leaves_the_scan() -> None:
     """A wall of 2 m across the straight line: around its end; where nothing leads around, straight and further."""
     wall = Scene(((0.5, -1.0, 0.6, 1.0),))

@@ -16,7 +16,7 @@ PLACE, ANGLE = 0.12, 0.4
 """[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all, and so to their sides."""
 ENOUGH = 0.05
 """[m] from what is made for it is reached: motions that end nearer to it, and begin later for that, are no better."""
-MOVERS, PATIENT, CLOSE, THINGS, KEPT = range(5)
+MOVERS, CLOSE, THINGS, KEPT = range(4)
 """Places of the margins."""
 
 
@@ -88,7 +88,6 @@ def search(
     and not because this time it was not found.
     """
     count = len(motions)
-    far = margins[MOVERS] + margins[PATIENT]
     floor = min(margins[KEPT], clearances(field, cell, discs, movers[:0], 0.0, 0.0, 0.0, 0.0)[0]) - 1e-6
     size_of_node = MOTIONS + depth
     kept, meant = np.zeros((1, size_of_node)), True
@@ -128,8 +127,8 @@ def search(
                         node[SPENT] += weights[CLOSER] * max(0.0, min(margins[CLOSE], stood) - apart)
                     if apart < 0.0:
                         node[SPENT] += weights[CONTACT] * h * (1.0 - apart / 0.2)
-                    elif apart < far:
-                        node[SPENT] += weights[NEAR] * h * (1.0 - apart / far)
+                    elif apart < margins[MOVERS]:
+                        node[SPENT] += weights[NEAR] * h * (1.0 - apart / margins[MOVERS])
                     if room < margins[THINGS]:
                         node[SPENT] += weights[TIGHT] * h * (1.0 - room / margins[THINGS])
                     node[SPENT] += weights[TURN] * h * abs(node[RATE])
