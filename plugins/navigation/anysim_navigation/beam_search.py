@@ -100,10 +100,10 @@ USUAL: dict[BaseKind, Search] = {
         Margins(close=0.12, kept=0.0),
     ),
 }
-"""Of kinds that differ. A car needs longer to get out of a way, so that it keeps further from people, and hits things that
-it does not keep from as it does; and it gets nowhere when it shunts to and fro, as it does when each time another of
-two plans is found. Who can go aside is out of a way at once, and swings round no corner. Neither is to wait before what
-is narrow."""
+"""Of kinds that differ. A car needs longer to get out of a way: it keeps further from people, and from things that it
+would be driven onto by that. It gets nowhere when it shunts to and fro, as it does when each time another of two plans
+is found. Who can go aside is out of a way at once, and swings round no corner. Neither is to wait before what is
+narrow."""
 
 
 class Chosen(NamedTuple):
