@@ -19,7 +19,9 @@ COARSE, FREE, BESIDE = 2, 0.85, 3.0
 """Cells of a scan that are one of what is left to go; shares of its smallest disc that a base keeps there; and [m] that
 are added where there is no way."""
 WINDOW = 0.35
-"""[s] of acceleration by which what is told may differ from what is."""
+"""[s] by which what is told is ahead of what is: so much later the motions have that velocity."""
+SOON = 2
+"""Steps before the end of a motion from which on a car is told the curve of the next one: its wheels take as long."""
 
 
 class Weights(NamedTuple):
@@ -75,11 +77,16 @@ class Margins(NamedTuple):
 
 
 class Search(NamedTuple):
-    """What makes the search of a kind of base."""
+    """What makes the search of a kind of base.
+
+    Attributes:
+        keeps: whether it goes on with what it chose last until it finds something better.
+    """
 
     weights: Weights = Weights()
     foresight: Foresight = Foresight()
     margins: Margins = Margins()
+    keeps: bool = False
 
 
 USUAL: dict[BaseKind, Search] = {
@@ -87,6 +94,7 @@ USUAL: dict[BaseKind, Search] = {
         Weights(contact=12.0, closer=60.0, near=3.0, tight=0.1, late=0.15, back=0.05),
         Foresight(fine=4, depth=8),
         Margins(close=0.2),
+        keeps=True,
     ),
     BaseKind.HOLONOMIC: Search(
         Weights(closer=30.0, near=1.0, tight=0.1, heading=0.0, late=0.15),
@@ -94,16 +102,17 @@ USUAL: dict[BaseKind, Search] = {
         Margins(close=0.12, kept=0.0),
     ),
 }
-"""Of kinds that differ. A car needs longer to get out of a way, and gets nowhere when it shunts to and fro; who can go
-aside is out of it at once, and swings round no corner. Neither is to wait before what is narrow."""
+"""Of kinds that differ. A car needs longer to get out of a way, and gets nowhere when it shunts to and fro, as it does
+when each time another of two plans is found; who can go aside is out of it at once, and swings round no corner. Neither
+is to wait before what is narrow."""
 
 
 class Chosen(NamedTuple):
-    """Velocities (3,), their cost [m], inf where all run into something, and the speed [m/s] of the whole motion."""
+    """Velocities (3,), their cost [m], inf where all run into something, and the plan that they belong to."""
 
     twist: Array
     cost: float
-    speed: float
+    plan: Array
 
 
 class BeamSearch:
@@ -115,15 +124,17 @@ class BeamSearch:
 
     Attributes:
         reach: [m] how far ahead the point of the way is that it makes for.
+        no_plan: (1 + depth,) int64, the plan of who has none: steps of its first motion that are past, and motions.
     """
 
     def __init__(self, limits: BaseLimits, search: Search | None = None, *, width: int = 120) -> None:
         """`width` states are gone on with after each motion."""
         self.limits = limits
-        weights, foresight, margins = search or USUAL.get(limits.kind, Search())
+        weights, foresight, margins, self._keeps = search or USUAL.get(limits.kind, Search())
         self._weights, self._margins = np.array(weights, dtype=float), np.array(margins)
         *size, aim = foresight
         self._size = *size, width
+        self.no_plan = np.array([0] + [-1] * foresight.depth)
         self.reach = float(limits.high[0]) * aim
         self._curved = limits.turning_radius > 0.0
         self._aside = limits.kind is BaseKind.HOLONOMIC
@@ -138,12 +149,12 @@ class BeamSearch:
         now: Array,
         movers: Array,
         gear: float = 0.0,
-        last: float = 0.0,
+        plan: Array | None = None,
     ) -> Chosen:
         """What is best now.
 
-        The arguments are those of `DynamicWindow.choose`; `gear` is -1 where the way is to be gone backwards, `last`
-        [m/s] the speed of what was chosen last.
+        The arguments are those of `DynamicWindow.choose`; `gear` is -1 where the way is to be gone backwards, `plan`
+        what was chosen a step ago.
         """
         from anysim_navigation.kernels import beam
 
@@ -157,7 +168,13 @@ class BeamSearch:
             now[1] = 0.0
         if self._curved:  # it goes further round than straight to a point ahead
             togo = left_to_go(field, cell, path, FREE * float(limits.discs[:, 2].min()))
-        first, cost = beam.search(
+        past, *meant = self.no_plan if plan is None else plan
+        last = float(self._motions[meant[0], 0]) if meant[0] >= 0 else 0.0
+        if not self._keeps:
+            past, *meant = self.no_plan
+        elif past == self._size[0]:  # its first motion is over
+            past, meant = 0, [*meant[1:], -1]
+        chosen, cost = beam.search(
             field,
             float(cell),
             limits.discs,
@@ -166,22 +183,27 @@ class BeamSearch:
             togo,
             COARSE * cell,
             now,
-            float(last),
+            last,
             motions,
             self._curved,
             limits.acceleration,
             float(gear),
+            np.array(meant),
+            int(past),
             self._weights,
             self._margins,
             STEP,
             *self._size,
         )
-        best = motions[first] if first >= 0 else np.zeros(3)
-        most = limits.acceleration * WINDOW
-        told = now + np.clip(best - now, -most, most)
+        told, left = now, WINDOW
+        for k, lasts in zip(chosen, ((self._size[0] - past) * STEP, WINDOW), strict=False):
+            most = limits.acceleration * min(lasts, left)
+            told, left = told + np.clip((motions[k] if k >= 0 else 0.0) - told, -most, most), left - min(lasts, left)
         if self._curved:
-            told[2] = best[2] * told[0]
-        return Chosen(told, cost, float(best[0]))
+            soon = chosen[1] if past >= self._size[0] - SOON else chosen[0]
+            told[2] = told[0] * (motions[soon, 2] if soon >= 0 else 0.0)
+        following = np.array([past + 1, *chosen]) if chosen[0] >= 0 else self.no_plan
+        return Chosen(told, cost, following)
 
 
 def _turning(limits: BaseLimits) -> Array:

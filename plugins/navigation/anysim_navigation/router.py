@@ -115,8 +115,9 @@ class BaseRouter:
         self._progress: list[Progress | None] = [None] * n
         self._gear = np.zeros(n)
         """Of a car on its way: 1 forwards, -1 backwards."""
-        self._meant = np.zeros(n)
-        """Speed [m/s] of the motion that the search chose last."""
+        self._no_plan = self.search.no_plan if self.search else np.zeros(0, dtype=np.int64)
+        self._plan = np.tile(self._no_plan, (n, 1))
+        """What the search chose last."""
         self._later: list[list[tuple[Array, float]]] = [[] for _ in range(n)]
         """Of a car's way, the stretches beyond its next change of direction, and their gears."""
         self.refused: dict[int, str] = {}
@@ -126,7 +127,7 @@ class BaseRouter:
         self.target[ids], self.mode[ids], self._steps[ids], self._replans[ids] = target, mode, 0, 0
         self._least[ids] = np.inf
         if mode is Mode.STAND:  # an episode begins so: it does not go on from what the last one ended with
-            self.twist[ids], self._meant[ids] = 0.0, 0.0
+            self.twist[ids], self._plan[ids] = 0.0, self._no_plan
         for env in ids.tolist():
             self._progress[env] = None
             self.refused.pop(env, None)
@@ -288,10 +289,10 @@ class BaseRouter:
         path, aim = self.window.ahead(progress, pose, field, cell, search.reach if search else None)
         gear = float(self._gear[env])
         if search:
-            found = search.choose(field, cell, path, aim, now, close, gear, self._meant[env])
-            self.twist[env], self._meant[env] = found.twist, found.speed
+            found = search.choose(field, cell, path, aim, now, close, gear, self._plan[env])
+            self.twist[env], self._plan[env] = found.twist, found.plan
             return
-        self._meant[env] = 0.0
+        self._plan[env] = self._no_plan
         if progress.recovering > 0:
             aim, gear = _roomiest(field, cell, movers), 0.0
             path = aim[None]
@@ -310,7 +311,7 @@ class BaseRouter:
         return all(clearances(field, self._grid.cell, discs, nobody, x, y, 0.0, 0.0)[0] > -0.02 for x, y in points)
 
 
-_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear", "_meant")
+_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear", "_plan")
 
 
 def pose_of(pose: Array) -> Array:

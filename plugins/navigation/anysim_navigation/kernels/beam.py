@@ -10,8 +10,8 @@ from anysim_navigation.kernels.window import SETTLED, between, clearances, dista
 
 CONTACT, CLOSER, NEAR, TIGHT, TURN, HEADING, LATE, BACK = range(8)
 """Places of the weights."""
-X, Y, YAW, SPEED, ASIDE, RATE, SPENT, FIRST = range(8)
-"""Columns of a node: where it is, how fast, what its motions have cost, and the first of them."""
+X, Y, YAW, SPEED, ASIDE, RATE, SPENT, MOTIONS = range(8)
+"""Columns of a node: where it is, how fast, what its motions have cost, and from there on which they were."""
 PLACE, ANGLE = 0.12, 0.4
 """[m], [rad] within which two nodes are one, if both go forwards, backwards or hardly at all, and so to their sides."""
 ENOUGH = 0.05
@@ -66,6 +66,8 @@ def search(
     curved: bool,
     acceleration: Array,
     gear: float,
+    plan: Array,
+    past: int,
     weights: Array,
     margins: Array,
     step: float,
@@ -73,32 +75,38 @@ def search(
     fine: int,
     depth: int,
     width: int,
-) -> tuple[int, float]:
-    """The motion to begin with, -1 if all run into something; and its cost [m].
+) -> tuple[Array, float]:
+    """The motions (depth,) to go through, -1 from where all run into something; and their cost [m].
 
     All is in the frame of the base as it is now. `motions` (K, 3) are speeds forward and to the left [m/s] with turns
     [rad/s], or where `curved` with curvatures [1/m]; each lasts so many `steps` of `step` [s], twice that from the one
     numbered `fine` on, and `depth` of them follow one another. `last` [m/s] is the speed of the motion that was chosen
     last.
+
+    `plan` (depth,) are motions of which the first is under way for `past` steps, -1 where there are none. Nothing
+    better crowds them out before their end is looked at: so what was meant last is given up for what is better alone,
+    and not because this time it was not found.
     """
     count = len(motions)
     floor = min(margins[KEPT], clearances(field, cell, discs, movers[:0], 0.0, 0.0, 0.0, 0.0)[0]) - 1e-6
-    kept = np.zeros((1, FIRST + 1))
+    size_of_node = MOTIONS + depth
+    kept, meant = np.zeros((1, size_of_node)), True
     kept[0, SPEED], kept[0, ASIDE], kept[0, RATE] = now[0], now[1], now[2]
-    first, cost, begun = -1, np.inf, 0.0
+    chosen, cost, begun = np.full(depth, -1), np.inf, 0.0
     for level in range(depth):
         h = step if level < fine else 2.0 * step
-        nodes, scores, found = np.empty((len(kept) * count, FIRST + 1)), np.empty(len(kept) * count), 0
+        ticks = steps - past if level == 0 else steps
+        nodes, scores, found = np.empty((len(kept) * count, size_of_node)), np.empty(len(kept) * count), 0
+        planned = -1
         for i in range(len(kept)):
             for k in range(count):
                 node = nodes[found]
                 node[:] = kept[i]
-                if level == 0:
-                    node[FIRST] = k
-                    if last * motions[k, 0] < 0.0:
-                        node[SPENT] += weights[BACK]
+                node[MOTIONS + level] = k
+                if level == 0 and last * motions[k, 0] < 0.0:
+                    node[SPENT] += weights[BACK]
                 free = True
-                for n in range(steps):
+                for n in range(ticks):
                     node[SPEED] = toward(node[SPEED], motions[k, 0], acceleration[0] * h)
                     node[ASIDE] = toward(node[ASIDE], motions[k, 1], acceleration[1] * h)
                     turn = motions[k, 2] * (node[SPEED] if curved else 1.0)
@@ -125,22 +133,29 @@ def search(
                         node[SPENT] += weights[TIGHT] * h * (1.0 - room / margins[THINGS])
                     node[SPENT] += weights[TURN] * h * abs(node[RATE])
                 if free:
+                    if meant and i == 0 and k == plan[level]:
+                        planned = found
                     left = remaining(node, aim, togo, size, gear, weights[HEADING])
-                    node[SPENT] += weights[LATE] * h * steps * left  # else it could as well go there later
+                    node[SPENT] += weights[LATE] * h * ticks * left  # else it could as well go there later
                     scores[found] = node[SPENT] + left
                     found += 1
         if found == 0:
             break
         order, seen = np.argsort(scores[:found]), {-1}
-        best, length = np.empty((width, FIRST + 1)), 0
+        best, length, meant = np.empty((width + 1, size_of_node)), 0, planned >= 0
+        if meant:
+            seen.add(cell_of(nodes[planned]))
+            best[0], length = nodes[planned], 1
         for index in order:
             key = cell_of(nodes[index])
             if key not in seen:
                 seen.add(key)
                 best[length] = nodes[index]
                 length += 1
-                if length == width:
+                if length == width + meant:
                     break
         kept = best[:length].copy()
-        first, cost, begun = int(kept[0, FIRST]), float(scores[order[0]]), begun + steps * h
-    return first, cost
+        for n in range(level + 1):
+            chosen[n] = int(nodes[order[0], MOTIONS + n])
+        cost, begun = float(scores[order[0]]), begun + ticks * h
+    return chosen, cost
