@@ -9,9 +9,10 @@ import anysim
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim_legged.walk import LipmWalk
+from anysim_navigation.delay import later
 
 ENGINES = ("mujoco", "pybullet", "sapien")
-STEP = 0.02
+STEP, TOLD = 0.02, 0.1
 SIDES = {"mujoco": (0, 2, 5), "pybullet": (1, 4, 6), "sapien": (0, 3, 7)}
 """From which of eight sides it is often pushed: between them the engines have all."""
 PUSHED = pytest.mark.parametrize(
@@ -100,6 +101,31 @@ def test_steps_catch_pushes_that_the_soles_do_not_hold(engine: str, sides: tuple
     assert (moved[np.isin(sides, (0, 4))] > 0.05).all(), "it stepped"
     assert (moved[np.isin(sides, (2, 6))] < 0.01).all(), "feet beside each other hold those from the sides"
     assert moved.max() < 0.6
+    made.close()
+
+
+@pytest.mark.slow
+def test_what_it_is_told_is_walked_after_the_delay_of_its_controller() -> None:
+    """From where it is it gets, with what it was told before, to where it is by then."""
+    made, rng = env("mujoco", "lipm_walk"), np.random.default_rng(0)
+    steps = round(made.actions.slice_of("g1", "base").controller.delay / TOLD)
+    poses, told, twist, wanted = [], [], np.zeros(3), np.zeros(3)
+    for tick in range(400):
+        if tick % 20 == 0:
+            wanted = rng.uniform(-1.0, 1.0, 3) * (0.25, 0.08, 0.3)
+        twist = twist + np.clip(wanted - twist, (-0.025, -0.025, -0.04), (0.025, 0.025, 0.04))
+        pose = pelvis(made)[0]
+        poses.append([*pose[:2], float(P.yaw(pose[3:]))])
+        told.append(twist)
+        run(made, twist, TOLD)
+    way, said = np.array(poses), np.array(told)
+    rows = np.arange(100, 380 - steps)
+    off = []
+    for since in (steps, 0):
+        sent = np.stack([said[row - since : row - since + steps] for row in rows])
+        off.append(np.hypot(*(later(way[rows], sent) - way[rows + steps])[:, :2].T))
+    print(f"off by {off[0].mean():.3f} m, {off[1].mean():.3f} m without delay")
+    assert off[0].mean() < 0.5 * off[1].mean()
     made.close()
 
 

@@ -123,6 +123,7 @@ class Controller(ABC):
         labels: names of the components, for people; empty for the names of the channel's joints.
         mode: which terms of the drive law act; the same for all drives of the channel, or one each.
         period: [s] between calls of `update`; None for one `apply` each control step and nothing between.
+        delay: [s] after which what it is told is done; who plans ahead begins where the robot is then.
     """
 
     dim: int
@@ -131,6 +132,7 @@ class Controller(ABC):
     labels: tuple[str, ...] = ()
     mode: ControlMode | tuple[ControlMode, ...] = ControlMode.POSITION
     period: float | None = None
+    delay: float = 0.0
 
     def __init__(self, channel: ChannelView, num_envs: int) -> None:
         self.channel = channel

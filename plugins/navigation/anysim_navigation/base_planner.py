@@ -95,4 +95,4 @@ class PlannedBase(Base):
             options["side"] = min(self.pace.speed, float(most[1]))
         options["back"] = min(self.pace.speed, float(-least[0]))
         speed, turn = min(self.pace.speed, float(most[0])), min(self.pace.rate, float(most[-1]))
-        return limits_of(kind, discs, speed=speed, turn=turn, **options)
+        return limits_of(kind, discs, speed=speed, turn=turn, delay=controller.delay, **options)

@@ -61,6 +61,7 @@ class BaseLimits(NamedTuple):
     acceleration: Array
     discs: Array
     turning_radius: float = 0.0
+    delay: float = 0.0
 
     @property
     def radius(self) -> float:
@@ -93,6 +94,7 @@ def limits_of(
     back: float | None = None,
     acceleration: tuple[float, float] | None = None,
     turning_radius: float = 0.0,
+    delay: float = 0.0,
 ) -> BaseLimits:
     """Limits with what is usual for a kind where nothing is given.
 
@@ -104,6 +106,7 @@ def limits_of(
         back: [m/s] backwards; as forward for what is holonomic, else half of it.
         acceleration: [m/s^2], [rad/s^2]; (1, 3), on legs `ACCELERATIONS`.
         turning_radius: [m] of a car.
+        delay: [s] after which it does what it is told.
     """
     if kind in (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN):
         side = 0.0
@@ -115,7 +118,7 @@ def limits_of(
         raise AnysimError("a car has a turning_radius above 0 [m]: wheelbase / tan(most steering)")
     low, high = np.array([-back, -side, -turn]), np.array([speed, side, turn])
     faster, sooner = acceleration or ACCELERATIONS.get(kind, (1.0, 3.0))
-    made = BaseLimits(kind, low, high, np.array([faster, faster, sooner]), discs, turning_radius)
+    made = BaseLimits(kind, low, high, np.array([faster, faster, sooner]), discs, turning_radius, delay)
     made.check()
     return made
 

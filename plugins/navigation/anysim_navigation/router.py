@@ -19,6 +19,7 @@ from anysim.task.scene import Frame, RobotView, SceneView
 from anysim_navigation.agent import NoRoute
 from anysim_navigation.beam_search import BeamSearch
 from anysim_navigation.car_ways import car_way
+from anysim_navigation.delay import later, seen_from
 from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
 from anysim_navigation.limits import SWAY, BaseKind, BaseLimits
 from anysim_navigation.maps import NavMaps
@@ -109,6 +110,8 @@ class BaseRouter:
         self._every = max(1, round(STEP / world.physics.control_dt))
         self.target, self.twist = np.zeros((2, n, 3))
         self.mode = np.full(n, Mode.STAND, dtype=np.int64)
+        self._told = np.zeros((n, round(limits.delay / STEP), 3))
+        """Velocities that the base is yet to have, those of the next step first."""
         self._steps, self._replans = np.zeros((2, n), dtype=np.int64)
         self._least = np.full(n, np.inf)
         """(N,) [m] the least that was left of any way."""
@@ -127,7 +130,7 @@ class BaseRouter:
         self.target[ids], self.mode[ids], self._steps[ids], self._replans[ids] = target, mode, 0, 0
         self._least[ids] = np.inf
         if mode is Mode.STAND:  # an episode begins so: it does not go on from what the last one ended with
-            self.twist[ids], self._plan[ids] = 0.0, self._no_plan
+            self.twist[ids], self._plan[ids], self._told[ids] = 0.0, self._no_plan, 0.0
         for env in ids.tolist():
             self._progress[env] = None
             self.refused.pop(env, None)
@@ -138,7 +141,8 @@ class BaseRouter:
 
     def velocities(self, ids: Array) -> Array:
         """(n, 3) what the base is to do now in these envs, which the scene looks at in this order."""
-        pose = pose_of(self._frame.pose)
+        here = pose_of(self._frame.pose)
+        pose = later(here, self._told[ids])
         due = self._steps[ids] % self._every == 0
         self._steps[ids] += 1
         routed = self.mode[ids] == Mode.ROUTE
@@ -147,7 +151,7 @@ class BaseRouter:
             routed |= (self.mode[ids] == Mode.DIRECT) & ends
         route = np.flatnonzero(due & routed)
         if len(route):
-            self._tick(ids, route, pose)
+            self._tick(ids, route, here, pose)
         for row, env in enumerate(ids.tolist()):
             mode = self.mode[env]
             if mode == Mode.ROUTE:
@@ -158,6 +162,8 @@ class BaseRouter:
                 self.twist[env] = self._pose_control.twist(way, turn, self.twist[env])
             else:
                 self.twist[env] = self._pose_control.turning(turn) if mode == Mode.TURN else 0.0
+        told = np.concatenate([self._told[ids[due]], self.twist[ids[due], None]], axis=1)
+        self._told[ids[due]] = told[:, 1:]
         return self.twist[ids]
 
     def snapshot(self, ids: Array) -> tuple[Errand, ...]:
@@ -180,7 +186,8 @@ class BaseRouter:
 
     # ------------------------------------------------------------------ a way is followed
 
-    def _tick(self, ids: Array, rows: Array, pose: Array) -> None:
+    def _tick(self, ids: Array, rows: Array, here: Array, pose: Array) -> None:
+        """From where bases are, and what is seen there; and from where they do what they are told now."""
         envs = ids[rows]
         for row, env in zip(rows.tolist(), envs.tolist(), strict=True):
             self._look(env, row, pose[row])
@@ -192,8 +199,12 @@ class BaseRouter:
         cells = occupancy(self._eye.geometry, posed, self._eye.poses[rows], self._grid, seen=self._seen)
         twist = self.twist[envs] if self.limits.kind in SWAY else in_base(self._frame.twist[rows], pose[rows])
         movers = self._movers.around(rows, pose[rows])
+        movers[..., :2] += self.limits.delay * movers[..., 2:4]
         for k, env in enumerate(envs.tolist()):
-            self._steer(env, pose[rows[k]], distances_of(cells[k], self._grid.cell), twist[k], movers[k])
+            field = distances_of(cells[k], self._grid.cell)
+            if self.limits.delay:
+                field = seen_from(field, self._grid.cell, here[rows[k]], pose[rows[k]])
+            self._steer(env, pose[rows[k]], field, twist[k], movers[k])
 
     def _look(self, env: int, row: int, pose: Array) -> None:
         """Where the base is on its way; a way is made where there is none, or it has become stale."""
@@ -311,7 +322,7 @@ class BaseRouter:
         return all(clearances(field, self._grid.cell, discs, nobody, x, y, 0.0, 0.0)[0] > -0.02 for x, y in points)
 
 
-_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear", "_plan")
+_ROWS = ("target", "twist", "mode", "_steps", "_replans", "_least", "_gear", "_plan", "_told")
 
 
 def pose_of(pose: Array) -> Array:
