@@ -17,7 +17,7 @@ from benchmark_table import table
 from generated import ROOT, main
 
 from anysim_navigation_bench.drive_store import DriveStore, rows
-from anysim_navigation_bench.drives import BASES, MET
+from anysim_navigation_bench.drives import BASES, MET, PACES
 
 STORE = ROOT / "docs" / "navigation.json"
 WORDS = {
@@ -54,17 +54,17 @@ def line(one: dict[str, Any]) -> list[str]:
 
 
 def rooms() -> str:
-    """Static rooms first, then those with people."""
+    """Static rooms first, then those with people, the quickest first."""
     found = sorted(rows(DriveStore(STORE)), key=lambda one: [*BASES, one["robot"]].index(one["robot"]))
     head = ["base", "engine", "arrived", "what failed, in rooms", "hardest contact", "time", "action"]
     parts = [table(head, [line(one) for one in found if not one["people"]])]
-    among = [one for one in found if one["people"]]
-    if among:
-        people = " and ".join(str(n) for n in sorted({one["people"] for one in among}))
+    for people, pace in sorted({(one["people"], -one["pace"]) for one in found if one["people"]}):
+        low, high = (-pace * v for v in PACES)
         parts += [
-            f"With {people} people who walk through the room at 0.2 to 0.5 m/s and yield to nothing; *met* counts "
-            "drives on which one touched the base, which stood, was moving away or aside, or moved towards them:",
-            table([*head, "met"], [line(one) for one in among]),
+            f"With {people} people who walk through the room at {low:g} to {high:g} m/s and yield to nothing; "
+            "*met* counts drives on which one touched the base, which stood, was moving away or aside, or moved "
+            "towards them:",
+            table([*head, "met"], [line(one) for one in found if (one["people"], -one["pace"]) == (people, pace)]),
         ]
     return "\n\n".join(parts)
 

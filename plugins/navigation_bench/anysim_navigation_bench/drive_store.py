@@ -17,11 +17,12 @@ PLACES = {"seconds": 2, "length": 2, "hardest": 1, "tick": 3}
 
 
 class Cell(NamedTuple):
-    """One base on one engine among so many people."""
+    """One base on one engine among so many people, who walk at so much of their usual pace."""
 
     robot: str
     engine: str
     people: int
+    pace: float = 1.0
 
 
 class DriveStore:
@@ -34,7 +35,7 @@ class DriveStore:
             return
         try:
             for line in json.loads(path.read_text("utf-8")):
-                cell = Cell(line["robot"], line["engine"], line["people"])
+                cell = Cell(line["robot"], line["engine"], line["people"], line.get("pace", 1.0))
                 self.drives[cell] = [Drive(*row) for row in line["drives"]]
         except (ValueError, TypeError, KeyError) as error:
             raise AnysimError(

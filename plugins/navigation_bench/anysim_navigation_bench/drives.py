@@ -100,11 +100,18 @@ class Drive(NamedTuple):
 
 
 def drive(
-    seed: int, robot: str, engine: str, *, radius: float | None = None, people: int = 0, planner: str = "dynamic_window"
+    seed: int,
+    robot: str,
+    engine: str,
+    *,
+    radius: float | None = None,
+    people: int = 0,
+    pace: float = 1.0,
+    planner: str = "dynamic_window",
 ) -> Drive | None:
     """Drive a base through the room of a seed; None where no way there is long enough.
 
-    `people` walk between points of the room meanwhile, and yield to nothing.
+    `people` walk between points of the room meanwhile, at `pace` times `PACES`, and yield to nothing.
     """
     world, how = random_room(seed), BASES.get(robot, Driving())
     half = np.abs(np.concatenate([world.geoms[g].position for g in world.body_geoms[0]])).max()
@@ -119,7 +126,7 @@ def drive(
     task = _task(seed, world, robot, how, start, goal, yaws, planner, steps)
     if people:
         walks = NavMaps(world, Agent(0.3, 1.9), area=box).at()
-        task["world"]["families"] = {"person": _people(people, walks, start, np.random.default_rng([seed, 2]))}
+        task["world"]["families"] = {"person": _people(people, pace, walks, start, np.random.default_rng([seed, 2]))}
         for name in ["person"] if people == 1 else [f"person_{number}" for number in range(people)]:
             task["world"]["contact_sensors"][f"met_{name}"] = {"body": name, "against": "base"}
             task["task"]["failure"][f"met_{name}"] = {**HIT, "sensor": f"met_{name}"}
@@ -141,7 +148,7 @@ def _ends(mesh: NavMesh, rng: np.random.Generator, size: list[float]) -> tuple[A
     return None
 
 
-def _people(count: int, mesh: NavMesh, start: Array, rng: np.random.Generator) -> dict[str, Any]:
+def _people(count: int, pace: float, mesh: NavMesh, start: Array, rng: np.random.Generator) -> dict[str, Any]:
     """Avatars that walk around furniture between random points, and begin away from the base."""
     each: list[dict[str, Any]] = []
     pairs = iter(free_pairs(mesh, 40 * count, rng).reshape(-1, 2))
@@ -158,7 +165,7 @@ def _people(count: int, mesh: NavMesh, start: Array, rng: np.random.Generator) -
             if len(points) + len(stretch) <= POINTS:
                 points, here = [*points, *stretch], target
         walk = [[round(float(v), 3) for v in point] for point in points]
-        speed = round(float(rng.uniform(*PACES)), 3)
+        speed = round(pace * float(rng.uniform(*PACES)), 3)
         do = [{"path": walk[k : k + 16], "speed": speed} for k in range(0, len(walk), 16)]
         each.append({"x": round(float(begin[0]), 3), "y": round(float(begin[1]), 3), "do": do})
     return {"kind": "avatar", "seed": int(rng.integers(1000)), "each": each, "again": True}
