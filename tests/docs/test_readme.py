@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from urllib.request import urlopen
+from urllib.request import HTTPCookieProcessor, build_opener
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ SHORTER = {
     "--hours 2": "--hours 0.01",
     "run pick_cube --engine sapien": "run pick_cube --engine sapien --episodes 2",
     "shards: 2}'": "shards: 2}' --episodes 2",
-    "--policy expert": "--policy expert --episodes 4",
+    "evaluate pick_cube -e all": "evaluate pick_cube -e all --episodes 4",
     "--steps 2000000": "--steps 4096 --exams 1",
     "core12 --workers 2": "core12 --workers 2 --only reach/*/zero",
     "anysim gallery": "anysim gallery --robots franka_panda --hold 0.1 --random 0.1",
@@ -82,8 +82,9 @@ def test_a_command_ends_as_the_page_says(line: str, folder: Path, monkeypatch: p
     for engine in ("mujoco", "sapien"):
         require_drawing(engine)
     words = _words(line, folder)
-    if "browser" in words:
-        _answers(words, folder, lambda address: urlopen(address).status == 200)
+    if "browser" in words or words[1] == "view":
+        browser = build_opener(HTTPCookieProcessor())  # the token of the address becomes a cookie
+        _answers(words, folder, lambda address: browser.open(address).status == 200)
         return
     if "serve" in words:
         monkeypatch.setenv("ANYSIM_STATE_DIR", str(folder / "state"))
