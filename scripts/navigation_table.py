@@ -47,7 +47,7 @@ def line(one: dict[str, Any]) -> list[str]:
         f"{one['solved']} of {one['rooms']} ({100 * low:.0f} to {100 * high:.0f} %)",
         failed(one),
         f"{one['hardest_contact_n']:.0f} N",
-        f"{one['time_over_shortest']:.1f}",
+        f"{one['time_over_shortest']:.1f}" if one["solved"] else "",
         f"{one['action_ms']:.1f} ms",
         *([", ".join(f"{one['met'][w]} {w}" for w in MET[1:] if w in one["met"])] if one["people"] else []),
     ]
