@@ -100,7 +100,7 @@ class BaseRouter:
         self._maps = [
             NavMaps(world, agent._replace(radius=limits.radius + more), without=(robot.name,)) for more in ROOM
         ]
-        height = frame_pose(scene, frame)[2]
+        self._height = height = frame_pose(scene, frame)[2]
         self._grid = Grid((6.0, 6.0), 0.04, agent.step - height, agent.height - height)
         self._eye = Eye(scene, frame, "collision", "entity")
         searches = limits.kind is not BaseKind.HUMANOID  # which is too slow for it, and keeps from all of a person
@@ -196,7 +196,10 @@ class BaseRouter:
             return
         rows, envs = rows[going], envs[going]
         posed = GeomPoses(*(array[rows] for array in self._eye.posed))
-        cells = occupancy(self._eye.geometry, posed, self._eye.poses[rows], self._grid, seen=self._seen)
+        eyes = self._eye.poses[rows]
+        if self.limits.kind in (BaseKind.HUMANOID, BaseKind.QUADRUPED):  # who bobs looks from above its lowest foot
+            eyes[:, 2] = self._height + posed.low[:, ~self._eye.seen, 2].min(axis=1)
+        cells = occupancy(self._eye.geometry, posed, eyes, self._grid, seen=self._seen)
         twist = self.twist[envs] if self.limits.kind in SWAY else in_base(self._frame.twist[rows], pose[rows])
         movers = self._movers.around(rows, pose[rows])
         movers[..., :2] += self.limits.delay * movers[..., 2:4]

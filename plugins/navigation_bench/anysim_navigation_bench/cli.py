@@ -64,7 +64,8 @@ def navigate(
     robots: Annotated[
         str,
         typer.Option(
-            help="Bases, separated by commas: of wheels, unitree_go1, unitree_g1, others with a base channel."
+            help="Bases, separated by commas: of wheels, unitree_go1, unitree_go1_learned (by the policy of "
+            "go1_velocity), unitree_g1, others with a base channel."
         ),
     ] = "differential_base,holonomic_base,ackermann_base",
     engines: Annotated[str, typer.Option("--engines", "-e", help="Installed engines, separated by commas.")] = "mujoco",

@@ -47,6 +47,8 @@ class Driving(NamedTuple):
         close, facing: [m], and 1 less the cosine of the angle; None where the heading is free.
         still: [m/s], [rad/s] that it may have in the end.
         tilts: whether it can fall.
+        robot: of the catalogue, where the base is not called as it is.
+        dynamics, physics: of that robot and of the world, where they are not the usual ones.
     """
 
     radius: float = 0.45
@@ -56,8 +58,13 @@ class Driving(NamedTuple):
     facing: float | None = 0.1
     still: tuple[float, float] = (0.05, 0.1)
     tilts: bool = False
+    robot: str | None = None
+    dynamics: dict[str, Any] = {}  # noqa: RUF012
+    physics: dict[str, Any] = {}  # noqa: RUF012
 
 
+_WALK = "package:anysim_tasks/legged/go1_velocity/walk.yaml"
+_AS_GO1 = {"tolerance": 0.15, "angle": 0.15, "speed": 0.5, "rate": 0.8}
 _ON_LEGS: dict[str, Any] = {"close": 0.25, "facing": 0.3, "still": (0.15, 0.6), "tilts": True}
 BASES: dict[str, Driving] = {
     "differential_base": Driving(controller="differential_drive", skill={"rate": 2.5}),
@@ -69,7 +76,15 @@ BASES: dict[str, Driving] = {
         close=0.25,
         facing=None,
     ),
-    "unitree_go1": Driving(skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.5, "rate": 0.8}, **_ON_LEGS),
+    "unitree_go1": Driving(skill=_AS_GO1, **_ON_LEGS),
+    "unitree_go1_learned": Driving(
+        robot="unitree_go1",
+        controller={"controller": "policy", "params": {"options": {"file": _WALK}}},
+        dynamics={"kp_scale": 0.26667, "kd_scale": 0.33333},  # and physics as it was trained with
+        physics={"dt": 0.004, "actuation": "explicit_pd"},
+        skill=_AS_GO1,
+        **_ON_LEGS,
+    ),
     "unitree_g1": Driving(
         controller="lipm_walk", skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.25, "rate": 0.3}, **_ON_LEGS
     ),
@@ -184,15 +199,16 @@ def _task(
     fell = {"fell": {"term": "not", "of": upright}} if how.tilts else {}
     skill = {"skill": "navigate", "robot": "base", "goal": "goal", "planner": planner, "steps": steps}
     return {
-        "physics": {"dt": 0.002, "control_dt": CONTROL_DT},
+        "physics": {"dt": 0.002, "control_dt": CONTROL_DT, **how.physics},
         "world": {
             "name": f"drive_{seed}",
             "room": room_of(seed),
             "robots": {
                 "base": {
-                    "robot": robot,
+                    "robot": how.robot or robot,
                     "position": [x, y, 0.0],
                     "yaw": float(yaws[0]),
+                    "dynamics": how.dynamics,
                     "actions": {"base": how.controller},
                 }
             },

@@ -58,6 +58,18 @@ def test_cars_and_legs_get_through_as_well(base: str, room: int) -> None:
     assert (found.ended, found.hardest < HARD) == ("success", True)
 
 
+@pytest.mark.parametrize(
+    "engine",
+    ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.param("sapien", marks=pytest.mark.slow)],
+)
+def test_a_learned_gait_gets_through(engine: str) -> None:
+    """It walks lower than it stands, by 2 cm: what is looked at is what is above its feet, and the floor is not."""
+    require_engine(engine)
+    found = drive(2, "unitree_go1_learned", engine)
+    assert found is not None
+    assert (found.ended, found.hardest < HARD) == ("success", True)
+
+
 def walled(gap: bool, slit: float = 0.0) -> TaskEnv:
     """A goal behind a wall, which is 8 m long or has a passage at its side; beside it there may be a slit [m]."""
     require_engine("mujoco")
