@@ -97,9 +97,7 @@ class BaseRouter:
         self.window = DynamicWindow(limits, margin=margin)
         self._pose_control = PoseControl(limits, close)
         agent = agent_of(world, robot.name, limits)
-        self._maps = [
-            NavMaps(world, agent._replace(radius=limits.radius + more), without=(robot.name,)) for more in ROOM
-        ]
+        self._maps = [NavMaps(world, agent._replace(radius=limits.radius + m), without=(robot.name,)) for m in ROOM]
         self._height = height = frame_pose(scene, frame)[2]
         self._grid = Grid((6.0, 6.0), 0.04, agent.step - height, agent.height - height)
         self._eye = Eye(scene, frame, "collision", "entity")
