@@ -90,7 +90,7 @@ def test_points_without_a_hull_and_long_names_are_refused_in_a_sentence(folder: 
         with pytest.raises(AssetError, match="not finite, or too far off"):
             meshes.hull_of("far", np.array([[0.0, 0, 0], [far, 0, 0], [0, 1, 0], [0, 0, 1]]), str(far))
     (folder / "long.gltf").write_text('{"buffers": [{"uri": "../' + "x/" * 100_000 + '"}]}')
-    with pytest.raises(AssetError, match=r"buffer (lies outside|cannot be found)") as caught:
+    with pytest.raises(AssetError, match="cannot be found: its path is longer than 4096 characters") as caught:
         meshes.collision_mesh(folder / "long.gltf")
     assert len(str(caught.value)) < 1000
 

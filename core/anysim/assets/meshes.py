@@ -32,6 +32,7 @@ VISUAL_ERROR = 0.002  # [m] that what is looked at may be off
 VISUAL_COLORS = 6
 SMALL_BYTES = 256_000  # arrays of a mesh up to so large stay in memory
 MATERIAL_FILES = 100  # of one .obj; what it names beyond is not read
+LONGEST_PATH = 4096  # [characters] of a file that a mesh names: what Linux opens
 _VERSION = "anysim-mesh-4"  # change with anything that changes the result
 _UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 _ONE: Vec3 = (1.0, 1.0, 1.0)
@@ -253,12 +254,14 @@ def _files_beside(path: Path, data: bytes) -> list[Path]:
     if path.suffix.lower() != ".gltf":
         return _material_files(path, data)
     try:
-        asked = [str(buffer.get("uri", "data:")) for buffer in json.loads(data).get("buffers", ())]
+        uris = [str(buffer.get("uri", "data:")) for buffer in json.loads(data).get("buffers", ())]
     except (ValueError, AttributeError, RecursionError) as error:
         raise AssetError(f"{path}: cannot be read as a mesh: {error}") from error
-    here = path.parent.resolve()
+    here, asked = path.parent.resolve(), [unquote(uri) for uri in uris if not uri.startswith("data:")]
+    if max(map(len, asked), default=0) > LONGEST_PATH:  # to resolve it would take seconds
+        raise AssetError(f"{path}: a buffer cannot be found: its path is longer than {LONGEST_PATH} characters")
     try:
-        files = [(here / unquote(name)).resolve() for name in asked if not name.startswith("data:")]
+        files = [(here / name).resolve() for name in asked]
     except (ValueError, RuntimeError, OSError) as error:  # no name of a file, or a loop of symbolic links
         raise AssetError(f"{path}: a buffer cannot be found: {str(error)[:300]}") from error
     for file in files:
