@@ -14,7 +14,9 @@ SPEEDS = (1.0, 0.5, 0.0, -1.0)
 TURNS = (-1.0, -0.4, 0.0, 0.4, 1.0)
 """Of the fastest turn, or of the tightest curve."""
 WAYS, PACES = 12, (1.0, 0.5)
-"""Directions of who goes sideways and does not turn, the first to what is made for, and shares of its speed."""
+"""Directions of who is holonomic and does not turn, the first to what is made for, and shares of its speed."""
+SIDES = np.radians([45.0, 90.0, 135.0, -45.0, -90.0, -135.0])
+"""[rad] directions in which others go that turn, but can go sideways too."""
 COARSE, FREE, BESIDE = 2, 0.85, 3.0
 """Cells of a scan that are one of what is left to go; shares of its smallest disc that a base keeps there; and [m] that
 are added where there is no way."""
@@ -116,7 +118,7 @@ class Chosen(NamedTuple):
 
 
 class BeamSearch:
-    """Velocities of a base among movers, sideways where it is holonomic. It remembers nothing.
+    """Velocities of a base among movers, sideways where it can go so. It remembers nothing.
 
     The dynamic window holds one velocity for the time that it looks ahead. Who has to turn first, or to shunt, needs
     several in a row to let somebody pass: here motions of half a second follow one another, and of all that they lead
@@ -130,11 +132,9 @@ class BeamSearch:
     def __init__(self, limits: BaseLimits, search: Search | None = None, *, width: int = 120) -> None:
         """`width` states are gone on with after each motion."""
         self.limits = limits
-        weights, foresight, margins, self._keeps = search or USUAL.get(limits.kind, Search())
-        self._weights, self._margins = np.array(weights, dtype=float), np.array(margins)
-        *size, aim = foresight
-        self._size = *size, width
-        self.no_plan = np.array([0] + [-1] * foresight.depth)
+        weights, (*size, aim), margins, self._keeps = search or USUAL.get(limits.kind, Search())
+        self._weights, self._margins, self._size = np.array(weights, dtype=float), np.array(margins), (*size, width)
+        self.no_plan = np.array([0] + [-1] * size[-1])
         self.reach = float(limits.high[0]) * aim
         self._curved = limits.turning_radius > 0.0
         self._aside = limits.kind is BaseKind.HOLONOMIC
@@ -159,13 +159,11 @@ class BeamSearch:
         from anysim_navigation.kernels import beam
 
         limits, togo, motions = self.limits, np.zeros((0, 0)), self._motions
-        now = np.array(now, dtype=float)
+        now = np.array(now, dtype=float) * (limits.high > 0.0)
         if self._aside:  # a gap as wide as it is lies where it makes for, not where it looks
             c, s = np.array(aim) / max(float(np.hypot(*aim)), 1e-9)
             motions = motions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
             motions = np.clip(motions, limits.low, limits.high)
-        else:
-            now[1] = 0.0
         if self._curved:  # it goes further round than straight to a point ahead
             togo = left_to_go(field, cell, path, FREE * float(limits.discs[:, 2].min()))
         past, *meant = self.no_plan if plan is None else plan
@@ -207,11 +205,14 @@ class BeamSearch:
 
 
 def _turning(limits: BaseLimits) -> Array:
-    """(K, 3) speeds [m/s], none of them sideways, with turns [rad/s], or of what cannot turn on the spot curvatures."""
+    """(K, 3) speeds [m/s] with turns [rad/s], or of what cannot turn on the spot curvatures; and those to its sides."""
     curved = limits.turning_radius > 0.0
     most = 1.0 / limits.turning_radius if curved else float(limits.high[2])
     speeds = [share * float(limits.high[0] if share >= 0 else -limits.low[0]) for share in SPEEDS]
-    return np.array([(v, 0.0, most * turn) for v in speeds for turn in (TURNS if v or not curved else (0.0,))])
+    turning = [(v, 0.0, most * turn) for v in speeds for turn in (TURNS if v or not curved else (0.0,))]
+    sides = SIDES if limits.high[1] > 0.0 else SIDES[:0]
+    aside = np.stack([np.cos(sides), np.sin(sides), 0.0 * sides], axis=1) * limits.high
+    return np.concatenate([turning, aside.clip(limits.low, limits.high)])
 
 
 def _sideways(limits: BaseLimits) -> Array:

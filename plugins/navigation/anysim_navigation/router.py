@@ -340,8 +340,7 @@ def in_base(twist: Array, pose: Array) -> Array:
 def frame_pose(scene: SceneView, frame: Frame) -> Array:
     """(7,) of a frame in the world, as that begins."""
     at = scene.engine.index.frame(frame.name)
-    local = np.array([*at.position, *at.quaternion])
-    return P.compose(scene.engine.world.initial_body_pose[at.body], local)
+    return P.compose(scene.engine.world.initial_body_pose[at.body], np.array([*at.position, *at.quaternion]))
 
 
 def _is_free(movers: Array) -> bool:

@@ -81,17 +81,19 @@ def test_one_velocity_at_a_time_is_caught_there() -> None:
 
 
 def test_who_can_goes_sideways_from_who_comes_and_the_others_do_not() -> None:
-    """Somebody comes along the way, a little to the right: to the left at once, and without a turn."""
+    """Somebody comes along the way, a little to the right: to the left at once, and on wheels without a turn."""
     person = np.array([[1.2, -0.1, -0.5, 0.0, PERSON]])
     asked = Scene().field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD, np.zeros(3), person
     told = {kind: BeamSearch(limits(kind)).choose(*asked).twist for kind in BaseKind}
     assert told[BaseKind.HOLONOMIC][1] > 0.25
     assert told[BaseKind.HOLONOMIC][2] == 0.0
-    assert all(told[kind][1] == 0.0 for kind in BaseKind if kind is not BaseKind.HOLONOMIC)
+    assert told[BaseKind.QUADRUPED][1] > 0.1
+    assert told[BaseKind.DIFFERENTIAL][1] == told[BaseKind.ACKERMANN][1] == 0.0
 
 
-def test_who_goes_sideways_more_slowly_keeps_to_that() -> None:
-    made, rng = limits_of(BaseKind.HOLONOMIC, DISC, speed=0.6, turn=1.5, side=0.2, back=0.3), np.random.default_rng(3)
+@pytest.mark.parametrize("kind", [BaseKind.HOLONOMIC, BaseKind.QUADRUPED])
+def test_who_goes_sideways_more_slowly_keeps_to_that(kind: BaseKind) -> None:
+    made, rng = limits_of(kind, DISC, speed=0.6, turn=1.5, side=0.2, back=0.3), np.random.default_rng(3)
     search, now, seen = BeamSearch(made), np.zeros(3), []
     for _ in range(40):
         person, aim = np.array([[*rng.uniform(-1, 1, 2), *rng.uniform(-0.5, 0.5, 2), PERSON]]), rng.uniform(-1, 1, 2)
