@@ -44,6 +44,6 @@ def test_the_engine_is_there_with_its_version(python: Path, program: Callable[..
 def test_the_tests_of_the_backend_and_of_soft_matter_pass(
     python: Path, program: Callable[..., CompletedProcess[str]]
 ) -> None:
-    words = ("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow and not full", *FOLDERS)
+    words = ("-m", "pytest", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow and not full", *FOLDERS)
     done = program(python, *words, timeout=3600)
     assert " passed" in done.stdout.splitlines()[-1]
