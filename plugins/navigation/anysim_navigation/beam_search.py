@@ -20,8 +20,6 @@ SIDES = np.radians([45.0, 90.0, 135.0, -45.0, -90.0, -135.0])
 COARSE, FREE, BESIDE = 2, 0.85, 3.0
 """Cells of a scan that are one of what is left to go; shares of its smallest disc that a base keeps there; and [m] that
 are added where there is no way."""
-WINDOW = 0.35
-"""[s] by which what is told is ahead of what is: so much later the motions have that velocity."""
 SOON = 2
 """Steps before the end of a motion from which on a car is told the curve of the next one: its wheels take as long."""
 
@@ -83,12 +81,14 @@ class Search(NamedTuple):
 
     Attributes:
         keeps: whether it goes on with what it chose last until it finds something better.
+        lead: [s] by which what is told is ahead of what is: so much later the motions have that velocity.
     """
 
     weights: Weights = Weights()
     foresight: Foresight = Foresight()
     margins: Margins = Margins()
     keeps: bool = False
+    lead: float = 0.35
 
 
 USUAL: dict[BaseKind, Search] = {
@@ -103,10 +103,11 @@ USUAL: dict[BaseKind, Search] = {
         Foresight(aim=2.4),
         Margins(close=0.12, kept=0.0),
     ),
+    BaseKind.QUADRUPED: Search(lead=STEP),
 }
 """Of kinds that differ. A car needs longer to get out of a way, and gets nowhere when it shunts to and fro, as it does
 when each time another of two plans is found; who can go aside is out of it at once, and swings round no corner. Neither
-is to wait before what is narrow."""
+is to wait before what is narrow. Legs do at once what they are told, and stumble over what changes more than that."""
 
 
 class Chosen(NamedTuple):
@@ -132,7 +133,7 @@ class BeamSearch:
     def __init__(self, limits: BaseLimits, search: Search | None = None, *, width: int = 120) -> None:
         """`width` states are gone on with after each motion."""
         self.limits = limits
-        weights, (*size, aim), margins, self._keeps = search or USUAL.get(limits.kind, Search())
+        weights, (*size, aim), margins, self._keeps, self._lead = search or USUAL.get(limits.kind, Search())
         self._weights, self._margins, self._size = np.array(weights, dtype=float), np.array(margins), (*size, width)
         self.no_plan = np.array([0] + [-1] * size[-1])
         self.reach = float(limits.high[0]) * aim
@@ -193,8 +194,8 @@ class BeamSearch:
             STEP,
             *self._size,
         )
-        told, left = now, WINDOW
-        for k, lasts in zip(chosen, ((self._size[0] - past) * STEP, WINDOW), strict=False):
+        told, left = now, self._lead
+        for k, lasts in zip(chosen, ((self._size[0] - past) * STEP, self._lead), strict=False):
             most = limits.acceleration * min(lasts, left)
             told, left = told + np.clip((motions[k] if k >= 0 else 0.0) - told, -most, most), left - min(lasts, left)
         if self._curved:

@@ -46,11 +46,9 @@ def static_map(world: World, agent: Agent, resolution: float, without: tuple[str
     Raises:
         AnysimError: the grid would have more than 25 million cells.
     """
-    robots = tuple(robot.name for robot in world.robots)
     others = tuple(e.name for e in world.entities if e.name == ROOM)
     poses, there = world.initial_body_pose, world.initial_presence
-    left_out = (*robots, *without)
-    things = outlines_of(world, poses, there, agent, (*left_out, *others))
+    things = outlines_of(world, poses, there, agent, (*(robot.name for robot in world.robots), *without, *others))
     shell = [e.name for e in world.entities if e.name != ROOM]
     walls = outlines_of(world, poses, there, agent, shell) if others else []
     area = area_around([*things, *walls], agent)

@@ -301,6 +301,7 @@ class BaseRouter:
         path, aim = self.window.ahead(progress, pose, field, cell, search.reach if search else None)
         gear = float(self._gear[env])
         if search:
+            now = self.twist[env] if self.limits.kind is BaseKind.QUADRUPED else now  # a trot sways
             found = search.choose(field, cell, path, aim, now, close, gear, self._plan[env])
             self.twist[env], self._plan[env] = found.twist, found.plan
             return

@@ -87,7 +87,7 @@ def test_who_can_goes_sideways_from_who_comes_and_the_others_do_not() -> None:
     told = {kind: BeamSearch(limits(kind)).choose(*asked).twist for kind in BaseKind}
     assert told[BaseKind.HOLONOMIC][1] > 0.25
     assert told[BaseKind.HOLONOMIC][2] == 0.0
-    assert told[BaseKind.QUADRUPED][1] > 0.1
+    assert told[BaseKind.QUADRUPED][1] > 0.05
     assert told[BaseKind.DIFFERENTIAL][1] == told[BaseKind.ACKERMANN][1] == 0.0
 
 
@@ -102,6 +102,21 @@ def test_who_goes_sideways_more_slowly_keeps_to_that(kind: BaseKind) -> None:
     assert (np.array(seen) <= made.high + 1e-12).all()
     assert (np.array(seen) >= made.low - 1e-12).all()
     assert np.abs(seen).max(axis=0)[1] == pytest.approx(0.2)
+
+
+def test_legs_are_told_no_more_than_they_can_change_in_a_tick() -> None:
+    """They do it at once, and stumble over more: a trot fell in 5 of 14 rooms on PyBullet. Wheels are told further."""
+    most, asked = {}, (Scene().field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD)
+    for kind in (BaseKind.HOLONOMIC, BaseKind.QUADRUPED):
+        made, rng = limits(kind), np.random.default_rng(5)
+        search, changes = BeamSearch(made), []
+        for _ in range(40):
+            now = rng.uniform(made.low, made.high)
+            person = np.array([[*rng.uniform(-1, 1, 2), *rng.uniform(-0.5, 0.5, 2), PERSON]])
+            changes.append(np.abs(search.choose(*asked, now, person).twist - now))
+        most[kind] = np.max(changes, axis=0) / made.acceleration
+    assert most[BaseKind.QUADRUPED] == pytest.approx(STEP)
+    assert most[BaseKind.HOLONOMIC] == pytest.approx(Search().lead)
 
 
 def test_who_is_shut_in_by_a_person_does_not_come_closer() -> None:
