@@ -252,8 +252,9 @@ def test_a_room_is_crossed_among_four_people(engine: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("base", "room"),  # in each of which the best single velocity was caught
+    ("base", "room"),  # in each of which the best single velocity was caught, and a trot without steps to its sides
     [
+        pytest.param("unitree_go1", 19, marks=pytest.mark.slow),
         pytest.param("differential_base", 8, marks=pytest.mark.slow),
         pytest.param("differential_base", 12, marks=pytest.mark.full),
         pytest.param("ackermann_base", 5, marks=pytest.mark.full),
