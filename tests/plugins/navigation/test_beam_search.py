@@ -105,7 +105,7 @@ def test_who_goes_sideways_more_slowly_keeps_to_that(kind: BaseKind) -> None:
 
 
 def test_legs_are_told_no_more_than_they_can_change_in_a_tick() -> None:
-    """They do it at once, and stumble over more: a trot fell in 5 of 14 rooms on PyBullet. Wheels are told further."""
+    """They do it at once, and stumble over more: a trot fell in 5 of 59 rooms on PyBullet. Wheels are told further."""
     most, asked = {}, (Scene().field(np.zeros(3)), CELL, way_to(AHEAD), AHEAD)
     for kind in (BaseKind.HOLONOMIC, BaseKind.QUADRUPED):
         made, rng = limits(kind), np.random.default_rng(5)
